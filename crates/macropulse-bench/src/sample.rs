@@ -263,6 +263,7 @@ fn anywhere(design: &Design, log: &ShotLog) -> Hits {
         cosine: vec![1.0; shots],
         material: vec![0; shots],
         object: vec![0; shots],
+        ..Hits::default()
     }
 }
 

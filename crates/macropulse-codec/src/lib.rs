@@ -2,12 +2,12 @@
 //!
 //! A transmitter fires **shots**; each sends a **macropulse**, the marks of a code word laid out on
 //! chips. A receiver is given the **ticks** at which its converters saw light, the **samples** of the
-//! signal, **histograms** of photons or **taps** of modulated light, and the **shot log** of what was sent when, and finds the delay
-//! of every shot. Nothing here knows a scene, light, a file system or a thread pool.
+//! signal, **histograms** of photons, **taps** of amplitude-modulated or **beats** of frequency-modulated light, and the
+//! **shot log** of what was sent when, and finds the delay of every shot. Nothing here knows a scene, light, a file system or a thread pool.
 //!
 //! * [`code`]: families of code words, payloads, the marks of every macropulse; counts chips only.
-//! * [`ShotLog`], and [`Ticks`], [`Samples`], [`Histograms`] or [`Taps`]: what a receiver is given, as columns; [`Cut`]: how
-//!   they are cut out of a stream.
+//! * [`ShotLog`], and [`Ticks`], [`Samples`], [`Histograms`], [`Taps`] or [`Beats`]: what a receiver is given, as columns;
+//!   [`Cut`]: how they are cut out of a stream.
 //! * [`files`]: shot logs and ticks as text and as bytes, the other records as bytes.
 //! * [`decode`]: the receivers, from records to returns.
 //! * [`statistics`]: the distributions that thresholds and forecasts are derived from.
@@ -23,6 +23,7 @@ pub mod statistics;
 pub mod steps;
 pub mod time;
 
+mod beats;
 mod cut;
 mod histograms;
 mod kernels;
@@ -32,6 +33,7 @@ mod shot_log;
 mod taps;
 mod ticks;
 
+pub use beats::{Beats, Peak};
 pub use cut::Cut;
 pub use histograms::Histograms;
 pub use kernels::level;

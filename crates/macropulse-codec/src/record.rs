@@ -1,6 +1,6 @@
 //! What a receiver is given beside its shot log.
 
-use crate::{Histograms, Samples, Taps, Ticks};
+use crate::{Beats, Histograms, Samples, Taps, Ticks};
 
 /// Declares the kinds of record: variant, type, name.
 macro_rules! kinds {
@@ -60,24 +60,27 @@ kinds! {
     Histograms, "histograms";
     /// Of lock-in detectors.
     Taps, "taps";
+    /// Of coherent detectors.
+    Beats, "beats";
 }
 
 impl RecordKind {
     /// Whether there is one of each shot, made of the light of that shot alone.
     pub fn is_by_shot(self) -> bool {
-        matches!(self, Self::Histograms | Self::Taps)
+        matches!(self, Self::Histograms | Self::Taps | Self::Beats)
     }
 }
 
 impl Given {
     /// How many ticks there are, or samples of all channels, or bins of all histograms, or
-    /// taps of all shots.
+    /// taps or places for peaks of all shots.
     pub fn len(&self) -> usize {
         match self {
             Self::Ticks(ticks) => ticks.len(),
             Self::Samples(samples) => samples.code.len(),
             Self::Histograms(histograms) => histograms.counts.len(),
             Self::Taps(taps) => taps.codes.len(),
+            Self::Beats(beats) => beats.found.len(),
         }
     }
 

@@ -4,6 +4,7 @@
 
 mod waveform;
 
+mod beat_files;
 mod contract;
 mod files;
 mod histogram;

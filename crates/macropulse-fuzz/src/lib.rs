@@ -72,6 +72,7 @@ targets! {
     samples, recorded::samples, 8192;
     histograms, recorded::histograms, 4096;
     taps, recorded::taps, 4096;
+    beats, recorded::beats, 4096;
     stream, recorded::stream, 4096;
     receiver, receivers::decode, 2048;
 }

@@ -1,8 +1,8 @@
-//! Shots, ticks, samples and histograms as text and as bytes.
+//! Shots, ticks, samples, histograms, taps and beats as text and as bytes.
 
 use macropulse::codec::files::{
-    Error, HistogramHeader, HistogramReader, Limits, SampleHeader, SampleReader, ShotReader,
-    Stream, TapHeader, TapReader, TickReader,
+    BeatHeader, BeatReader, Error, HistogramHeader, HistogramReader, Limits, SampleHeader,
+    SampleReader, ShotReader, Stream, TapHeader, TapReader, TickReader,
 };
 use macropulse::codec::{Cut, Given};
 
@@ -98,6 +98,20 @@ pub fn histograms(bytes: &[u8]) {
         while let Some(histogram) = told(reader.next_histogram()).flatten() {
             assert_eq!(histogram.counts.len(), HISTOGRAMS.bins as usize);
         }
+    }
+}
+
+/// What the beats of the sensor begin with.
+const BEATS: BeatHeader = BeatHeader { ramps: 2, peaks: 2, digest: None, count: None };
+
+/// Reads `bytes` as beats, and cuts those of three shots out of them.
+pub fn beats(bytes: &[u8]) {
+    let Some(shots) = told(ShotReader::new(SHOTS, LIMITS)) else { return };
+    let Some(beats) = told(BeatReader::new(bytes, &BEATS)) else { return };
+    let mut stream = Stream::of_beats(CUT, shots, beats);
+    while let Some((log, given)) = told(stream.next_band(|first| first + 2)).flatten() {
+        let Given::Beats(beats) = given else { break };
+        assert_eq!(beats.found.len(), 4 * log.len());
     }
 }
 

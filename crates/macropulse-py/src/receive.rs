@@ -4,7 +4,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use macropulse::channel::Operating;
-use macropulse::codec::{Given, Histograms, RecordKind, Samples, ShotLog, Taps, Ticks};
+use macropulse::codec::{
+    Beats, Given, Histograms, Peak, RecordKind, Samples, ShotLog, Taps, Ticks,
+};
 use macropulse::design::Design;
 use macropulse::emit::{Band, Shot, bands, shot_of_pixel};
 use macropulse::points::{Piece, PointCloud, Scale, Truth};
@@ -33,6 +35,9 @@ const TICKS: [&str; 4] = ["epoch", "tick", "channel", "amplitude"];
 const SAMPLES: [&str; 3] = ["epoch", "channel", "code"];
 const HISTOGRAMS: [&str; 4] = ["bin_fs", "offset_fs", "cycles", "counts"];
 const TAPS: [&str; 1] = ["codes"];
+
+/// The columns of beats.
+const BEATS: [&str; 2] = ["frequency", "power"];
 
 /// What a receiver is given of a scan, band after band: `for shots, ticks in record(...)`, or samples.
 #[pyclass(frozen, module = "macropulse")]
@@ -72,6 +77,7 @@ impl Records {
             Given::Samples(samples) => told_of_samples(py, samples)?,
             Given::Histograms(histograms) => told_of_histograms(py, histograms)?,
             Given::Taps(taps) => told_of_taps(py, taps)?,
+            Given::Beats(beats) => told_of_beats(py, &beats)?,
         };
         Ok(Some((told_of_shots(py, log)?, given)))
     }
@@ -176,7 +182,19 @@ fn told_of_taps(py: Python<'_>, taps: Taps) -> PyResult<Bound<'_, PyDict>> {
     Ok(told)
 }
 
-/// Decodes ticks, samples, histograms or taps, from a simulation or from hardware, with no scene: out of arrays, or out
+fn told_of_beats<'py>(py: Python<'py>, beats: &Beats) -> PyResult<Bound<'py, PyDict>> {
+    let told = PyDict::new(py);
+    let each = (beats.ramps * beats.peaks).max(1) as usize;
+    let shape = [beats.found.len() / each, each];
+    let frequency: Vec<f64> = beats.found.iter().map(|peak| peak.bins()).collect();
+    let power: Vec<f64> = beats.found.iter().map(|peak| peak.power()).collect();
+    for (key, column) in BEATS.into_iter().zip([frequency, power]) {
+        told.set_item(key, PyArray1::from_vec(py, column).reshape(shape)?)?;
+    }
+    Ok(told)
+}
+
+/// Decodes ticks, samples, histograms, taps or beats, from a simulation or from hardware, with no scene: out of arrays, or out
 /// of files as `macropulse decode` does.
 ///
 /// Args:
@@ -232,6 +250,7 @@ pub fn decode(
         RecordKind::Ticks => Given::Ticks(ticks_of(&design, ticks)?),
         RecordKind::Histograms => Given::Histograms(histograms_of(&design, ticks)?),
         RecordKind::Taps => Given::Taps(taps_of(&design, ticks)?),
+        RecordKind::Beats => Given::Beats(beats_of(&design, ticks)?),
     };
     if given.is_empty() {
         let recorded = design.records().name();
@@ -292,7 +311,7 @@ fn paths(shots: &Bound<'_, PyAny>, ticks: &Bound<'_, PyAny>) -> PyResult<[PathBu
     match (shots.extract(), ticks.extract()) {
         (Ok(shots), Ok(ticks)) => Ok([shots, ticks]),
         _ => Err(wrong(
-            "shots and ticks, samples, histograms or taps: give two dictionaries of columns, or the paths of two files",
+            "shots and ticks, samples, histograms, taps or beats: give two dictionaries of columns, or the paths of two files",
         )),
     }
 }
@@ -575,4 +594,28 @@ fn histograms_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Histogr
         cycles: column(given, ("histograms", "cycles"), Some(vec![pulses; rows]))?,
         counts,
     })
+}
+
+/// The beats that a dictionary holds.
+fn beats_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Beats> {
+    check_keys(given, "beats", &BEATS)?;
+    let ([shots, places], frequency): ([usize; 2], Vec<f64>) =
+        by_shot(given, ("beats", "frequency", "place for a peak"))?;
+    let (shape, power): ([usize; 2], Vec<f64>) =
+        by_shot(given, ("beats", "power", "place for a peak"))?;
+    let (ramps, peaks) = design.beat_header().map_or((0, 0), |it| (it.ramps, it.peaks));
+    if places != (ramps * peaks) as usize {
+        let name = &design.name;
+        return Err(wrong(format!(
+            "beats: `frequency` has {places} columns, and {name} has {ramps} ramps with {peaks} peaks each"
+        )));
+    }
+    if shape != [shots, places] {
+        return Err(wrong(format!(
+            "beats: `power` has the shape {shape:?}, and `frequency` has {:?}",
+            [shots, places]
+        )));
+    }
+    let found = frequency.into_iter().zip(power).map(|(bins, power)| Peak::of(bins, power));
+    Ok(Beats { ramps, peaks, found: found.collect() })
 }

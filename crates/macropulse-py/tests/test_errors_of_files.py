@@ -39,9 +39,9 @@ def but(columns, **changed):
 # said of it.
 DECODED = [
     (lambda s, t: (t, s), "shots: has a column `tick`; the shots come first, then the ticks", ""),
-    (lambda s, t: ("shots.mps", t), "shots and ticks, samples, histograms or taps: give two dictionaries", "the paths of two files"),
-    (lambda s, t: (s, t["tick"]), "shots and ticks, samples, histograms or taps: give two dictionaries", ""),
-    (lambda s, t: (s, None), "shots and ticks, samples, histograms or taps: give two dictionaries", ""),
+    (lambda s, t: ("shots.mps", t), "shots and ticks, samples, histograms, taps or beats: give two dictionaries", "the paths of two files"),
+    (lambda s, t: (s, t["tick"]), "shots and ticks, samples, histograms, taps or beats: give two dictionaries", ""),
+    (lambda s, t: (s, None), "shots and ticks, samples, histograms, taps or beats: give two dictionaries", ""),
     (lambda s, t: (but(s, lable=s["label"]), t), "shots: unknown column `lable`; did you mean `label`?", ""),
     (lambda s, t: (s, but(t, amplitudes=[1.0])), "ticks: unknown column `amplitudes`", "`amplitude`?"),
     (lambda s, t: (but(s, fired_at_fs=None), t), "shots: there is no column `fired_at_fs`", ""),

@@ -134,6 +134,45 @@ def test_taps_decode_to_the_points_of_the_simulation():
     assert "did you mean `codes`" in told(code=codes)
 
 
+def test_beats_decode_to_the_points_of_the_simulation():
+    ideal = {"chirp.linewidth_khz": 0.0, "spectrum.fidelity": "spectrum"}
+    sensor = mp.Sensor("fmcw-1550", {"scan.raster.rows": 4, "scan.raster.columns": 60, **ideal})
+    scene = mp.Scene("wall", {"object.wall.position_m.x": 30.0, "object.wall.velocity_m_s": [-4.0, 0.0, 0.0]})
+    whole = mp.simulate(sensor, scene, seed=5)
+    [(shots, beats)] = mp.record(sensor, scene, seed=5)
+    frequency, power = beats["frequency"], beats["power"]
+    assert sorted(beats) == ["frequency", "power"] and frequency.shape == power.shape == (240, 16)
+    decoded = mp.decode(sensor, shots, beats)
+    for column in ("x", "range", "intensity", "row", "column", "margin", "photons", "radial_velocity"):
+        np.testing.assert_array_equal(getattr(decoded, column), getattr(whole, column))
+    right = whole.outcome == 1
+    assert right.sum() > 20
+    error = whole.radial_velocity[right] - whole.true_radial_velocity[right]
+    assert abs(error.mean()) < 0.02 and whole.radial_velocity[right].mean() > 3.0
+
+    # The receiver again, from its definition: the strongest peak of each ramp, in hertz.
+    up, down = (frequency[:, place] / 5e-6 for place in (0, 8))
+    slope = 0.64e9 / 5e-6
+    ranges = 299_792_458.0 / 2.0 * (up + down) / (2.0 * slope)
+    speeds = 1550e-9 * (down - up) / 4.0
+    once = (whole.number_of_returns == 1) & (whole.return_number == 1)
+    shot = whole.row[once].astype(int) * 60 + whole.column[once]
+    order = {place: at for at, place in enumerate(shots["row"].astype(int) * 60 + shots["column"])}
+    at = np.array([order[place] for place in shot])
+    np.testing.assert_allclose(ranges[at], whole.range[once], rtol=1e-6)
+    np.testing.assert_allclose(speeds[at], whole.radial_velocity[once], atol=1e-4)
+
+    def told(**changed):
+        with pytest.raises(mp.Error) as raised:
+            mp.decode(sensor, shots, {**beats, **changed})
+        return str(raised.value)
+
+    assert "1 dimensions" in told(frequency=frequency.ravel())
+    assert "`frequency` has 15 columns" in told(frequency=frequency[:, 1:])
+    assert "`power` has the shape [240, 15]" in told(power=power[:, 1:])
+    assert "did you mean `power`" in told(powers=power)
+
+
 def test_ticks_that_were_made_by_hand():
     """A single echo, laid out mark by mark here: its range is known."""
     sensor = mp.Sensor("kim-park-2016-fixed")

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use macropulse::codec::decode::{self, Returns};
 use macropulse::codec::files::{
-    self, Digest, HistogramReader, SampleReader, ShotHeader, ShotReader, Stream, TapReader,
-    TickReader, What,
+    self, BeatReader, Digest, HistogramReader, SampleReader, ShotHeader, ShotReader, Stream,
+    TapReader, TickReader, What,
 };
 use macropulse::codec::{Given, RecordKind, ShotLog};
 use macropulse::design::Design;
@@ -165,6 +165,10 @@ impl Decoding {
             let taps = TapReader::new(record.bytes, &wanted).map_err(invalid)?;
             let digest = taps.header().digest;
             (Stream::of_taps(cut, shots, taps), digest)
+        } else if let Some(wanted) = design.beat_header() {
+            let beats = BeatReader::new(record.bytes, &wanted).map_err(invalid)?;
+            let digest = beats.header().digest;
+            (Stream::of_beats(cut, shots, beats), digest)
         } else {
             let tick_fs = design.clock.tick_fs;
             let ticks = TickReader::new(record.bytes, tick_fs, channels).map_err(invalid)?;

@@ -53,6 +53,9 @@ const PER_BIN: f64 = 8.0;
 /// Of a tap: its code, and the same once more where it is written.
 const PER_TAP: f64 = 4.0;
 
+/// Of a peak: its frequency and its power, and the same once more where it is written.
+const PER_PEAK: f64 = 16.0;
+
 /// The memory of a run, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Estimate {
@@ -144,6 +147,10 @@ fn band(design: &Design, operating: &Operating) -> u64 {
         Readout::Taps => {
             let taps = design.emission.modulation().map_or(0, Modulation::taps);
             band.shots as f64 * f64::from(taps) * PER_TAP
+        }
+        Readout::Spectrum(spectrum) => {
+            let ramps = design.emission.chirp().map_or(0, |chirp| chirp.ramps().len());
+            band.shots as f64 * ramps as f64 * f64::from(spectrum.peaks) * PER_PEAK
         }
     };
     (shots * per_shot + recorded) as u64

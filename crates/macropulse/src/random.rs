@@ -47,6 +47,12 @@ pub enum Stage {
     Forecast = 15,
     /// The taps of a shot. Indexed by shot.
     LockIn = 16,
+    /// The field of each path of a shot in the mode of a coherent receiver. Indexed by shot.
+    Field = 17,
+    /// The noise of a spectrum. Indexed by shot, parts by ramp.
+    Spectrum = 18,
+    /// How the phase of a laser wanders during a shot. Indexed by shot.
+    Phase = 19,
 }
 
 /// The counter at which a run of random numbers begins.

@@ -405,6 +405,8 @@ pub struct Tally {
     pub counts: u64,
     /// Taps that reached it.
     pub taps: u64,
+    /// Peaks of spectra that reached it.
+    pub peaks: u64,
     /// Detection events that fell into the tick of another one.
     pub merged: u64,
     /// Detection events that found every converter busy.
@@ -439,6 +441,7 @@ impl Tally {
             (&mut self.samples, other.samples),
             (&mut self.counts, other.counts),
             (&mut self.taps, other.taps),
+            (&mut self.peaks, other.peaks),
             (&mut self.merged, other.merged),
             (&mut self.lost, other.lost),
             (&mut self.returns, other.returns),
@@ -473,6 +476,10 @@ impl Tally {
             _ if self.taps > 0 => Some(
                 "the receiver found none of the echoes in the taps: too little light for the noise, or so much \
                  that the taps are full",
+            ),
+            _ if self.peaks > 0 => Some(
+                "the receiver found none of the echoes in the peaks of the spectra: too little light for the noise, or \
+                 a laser whose line is too broad",
             ),
             _ if self.detections == 0 => {
                 Some("the detector saw none of the echoes: too little light for its sensitivity")

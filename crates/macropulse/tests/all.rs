@@ -7,6 +7,7 @@ mod tetra;
 
 mod beyond_the_gate;
 mod code_families;
+mod chirped;
 mod combinations;
 mod data_sheets;
 mod designs;

@@ -64,8 +64,10 @@ fn section() -> &'static str {
 
 /// What the first column of the table names: the detectors of pulses, and what stands behind a photodiode.
 fn detectors() -> Vec<&'static str> {
-    let others =
-        Detector::NAMES.iter().copied().filter(|name| !["photodiode", "lock-in"].contains(name));
+    let others = Detector::NAMES
+        .iter()
+        .copied()
+        .filter(|name| !["photodiode", "lock-in", "coherent"].contains(name));
     others.chain(["comparator", "adc"]).collect()
 }
 

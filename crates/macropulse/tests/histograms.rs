@@ -237,5 +237,5 @@ fn what_does_not_go_together_is_refused() {
     }
     let kim =
         Design::open("kim-park-2016", &[("receiver.least_share".to_owned(), "0.1".to_owned())]);
-    assert!(kim.unwrap_err().to_string().contains("only `histogram` is given counts"));
+    assert!(kim.unwrap_err().to_string().contains("only `histogram` and `beat` compare returns"));
 }

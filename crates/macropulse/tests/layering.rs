@@ -45,9 +45,10 @@ const CODEC: Layers = Layers {
         Rule { module: "samples", may_name: &[], because: "samples are columns" },
         Rule { module: "histograms", may_name: &[], because: "histograms are columns" },
         Rule { module: "taps", may_name: &[], because: "taps are columns" },
+        Rule { module: "beats", may_name: &[], because: "beats are columns" },
         Rule {
             module: "record",
-            may_name: &["histograms", "samples", "taps", "ticks"],
+            may_name: &["beats", "histograms", "samples", "taps", "ticks"],
             because: "a record is one of them",
         },
         Rule {
@@ -57,12 +58,22 @@ const CODEC: Layers = Layers {
         },
         Rule {
             module: "files",
-            may_name: &["cut", "histograms", "record", "samples", "shot_log", "taps", "ticks"],
+            may_name: &[
+                "beats",
+                "cut",
+                "histograms",
+                "record",
+                "samples",
+                "shot_log",
+                "taps",
+                "ticks",
+            ],
             because: "files hold shots and what was recorded of them, whoever made them and whatever decodes them",
         },
         Rule {
             module: "decode",
             may_name: &[
+                "beats",
                 "code",
                 "histograms",
                 "kernels",
@@ -414,6 +425,7 @@ fn modules_named(text: &str, own: &str, known: &[String]) -> BTreeSet<String> {
         "Samples" => "samples".to_owned(),
         "Histograms" => "histograms".to_owned(),
         "Taps" => "taps".to_owned(),
+        "Beats" | "Peak" => "beats".to_owned(),
         "Cut" => "cut".to_owned(),
         _ => name.to_owned(),
     };

@@ -234,5 +234,5 @@ fn modulated_lidars_are_refused_as_interferers() {
                 sensor = \"itof-camera\"\nposition_m = [1.0, 0.0, 0.0]\n";
     let scene = Scene::from_toml(text, "two.toml", Path::new("")).unwrap();
     let told = Operating::in_scene(&camera(&[]), &scene).unwrap_err().to_string();
-    assert!(told.contains("light of modulated lidars as `itof-camera`"), "{told}");
+    assert!(told.contains("light of lidars without pulses as `itof-camera`"), "{told}");
 }

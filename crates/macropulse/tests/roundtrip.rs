@@ -38,6 +38,7 @@ fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
             cosine: each(&|at| 1.0 - at / 64.0),
             outcome: all.iter().map(|point| Outcome::ALL[1 + place(point) % 3]).collect(),
         };
+        truth.radial_velocity = each(&|at| 4.0 - at);
         for pixel in 0..pixels {
             let shown = all.iter().position(|&(other, _)| other == pixel);
             // Of a pixel without a return, the first surface.
@@ -73,6 +74,7 @@ fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
         peak: count(3),
         marks: count(5),
         margin: count(2),
+        radial_velocity: each(&|at| at - 5.0),
         photons: vec![f32::NAN; all.len()],
         saturated: all.iter().map(|point| place(point) % 3 == 1).collect(),
         fired_ns,
@@ -122,6 +124,9 @@ fn assert_same_returns(read: &PointCloud, written: &PointCloud) {
     assert_eq!(read.marks, written.marks);
     assert_eq!(read.margin, written.margin);
     assert_eq!(read.saturated, written.saturated);
+    assert_same(&read.radial_velocity, &written.radial_velocity, 0.0, "radial velocity");
+    let velocities = [read, written].map(|cloud| &cloud.truth.radial_velocity);
+    assert_same(velocities[0], velocities[1], 0.0, "true radial velocity");
     assert_same_truth(&read.truth.returns, &written.truth.returns);
 }
 
@@ -323,7 +328,7 @@ fn csv_holds_the_returns_to_the_last_digit() {
     assert_eq!(
         lines.next().unwrap(),
         "x_m,y_m,z_m,intensity,range_m,time_ns,row,column,ring,peak,marks,margin,\
-         return_number,number_of_returns,flags"
+         return_number,number_of_returns,flags,radial_velocity_m_s"
     );
     for (at, line) in lines.enumerate() {
         let cells: Vec<&str> = line.split(',').collect();
@@ -334,6 +339,7 @@ fn csv_holds_the_returns_to_the_last_digit() {
         assert_eq!(cells[5].parse::<f64>().unwrap(), written.time_ns[at]);
         assert_eq!(place(11), usize::from(written.margin[at]));
         assert_eq!([place(12), place(13)], [1 + at % 2, 2]);
+        assert_eq!(cells[15].parse::<f32>().unwrap(), written.radial_velocity[at]);
     }
     assert_eq!(text.lines().count(), 1 + written.returns());
 }

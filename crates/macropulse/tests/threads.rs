@@ -46,7 +46,7 @@ fn pcd(cloud: &PointCloud) -> Vec<u8> {
 /// Every column of the cloud, as bits: NaN equals itself, and 0 is not −0.
 fn bits(cloud: &PointCloud) -> Vec<Vec<u64>> {
     let PointCloud { scan, rows, columns, viewpoint, returns_per_shot, pick, .. } = cloud;
-    let Truth { returns, pixels } = &cloud.truth;
+    let Truth { returns, pixels, .. } = &cloud.truth;
     let attributes = Attribute::ALL.into_iter().filter_map(|attribute| attribute.entries(cloud));
     let of_returns = attributes
         .map(|entries| (0..cloud.returns()).map(|at| entries.number(at).to_bits()).collect());

@@ -8,7 +8,7 @@ use macropulse::environment::Environment;
 use macropulse::memory::Estimate;
 use macropulse::predict::deepest_baseline;
 use macropulse::predict::unmodelled::{self, LeftOut};
-use macropulse::units::s_from_fs;
+use macropulse::units::{range_from_tof, s_from_fs};
 use macropulse_study::record::{defaults, not_modelled, surroundings};
 use serde_json::{Map, Value, json};
 
@@ -121,8 +121,10 @@ fn at_work(design: &Design, (operating, estimate): (&Operating, &Estimate)) -> C
         );
         columns.push("baseline", told);
     }
-    let events = format!("{:.3e} a second without any light of lidars", operating.false_rate);
-    columns.push("false detections", events);
+    if design.emission.is_pulsed() {
+        let events = format!("{:.3e} a second without any light of lidars", operating.false_rate);
+        columns.push("false detections", events);
+    }
     columns.push("memory of a run", format!("{}, and that of the scene", estimated(estimate)));
     columns
 }
@@ -190,6 +192,9 @@ fn ranges(design: &Design, derived: &Derived) -> Columns {
                 format!("{} m, where the phases of all modulation frequencies repeat", short(range))
             }
             Some(range) => format!("{} m, where a code word comes again", short(range)),
+            None if design.emission.chirp().is_some() => {
+                "as far as its samples hold the beats".to_owned()
+            }
             None => "by the detector alone: shots carry no code".to_owned(),
         },
     );
@@ -227,13 +232,22 @@ fn light(design: &Design, derived: &Derived) -> Columns {
         columns.push("shot", format!("modulated with {} MHz, in {length} ms", mhz.join(", ")));
         let taps = counted(u64::from(modulation.phases), "tap");
         columns.push("", format!("{taps} of each frequency, {exposure} us long"));
+    } else if let Some(chirp) = design.emission.chirp() {
+        let (ghz, length) = (short(chirp.bandwidth * 1e-9), short(derived.macropulse * 1e6));
+        let cell = short(range_from_tof(1.0 / chirp.bandwidth));
+        columns.push("shot", format!("a frequency that changes by {ghz} GHz, in {length} us"));
+        let times: Vec<String> =
+            chirp.ramps().iter().map(|ramp| format!("{} us", short(ramp.seconds * 1e6))).collect();
+        columns.push("", format!("recorded for {}: bins of {cell} m", times.join(" up and ")));
+        columns.push("", format!("line {} kHz wide", short(chirp.linewidth * 1e-3)));
     } else {
         let pulse = short(design.light.pulse * 1e12);
         columns.push("shot", format!("one micropulse of {pulse} ps, not coded"));
     }
     let sensitivity = match derived.reference_photons {
         photons if photons.is_finite() => {
-            format!("{} photons per mark from the reference target", short(photons))
+            let part = if design.emission.is_pulsed() { "mark" } else { "shot" };
+            format!("{} photons per {part} from the reference target", short(photons))
         }
         _ => "never misses".to_owned(),
     };

@@ -21,6 +21,7 @@ pub struct Records {
     pub samples: bool,
     pub histograms: bool,
     pub taps: bool,
+    pub beats: bool,
 }
 
 impl Records {
@@ -33,14 +34,16 @@ impl Records {
     pub fn add(&mut self, name: &str) -> bool {
         let form = form(name);
         let is = |kind: RecordKind| name.trim().eq_ignore_ascii_case(kind.name());
-        let [samples, histograms, taps] =
-            [RecordKind::Samples, RecordKind::Histograms, RecordKind::Taps].map(is);
+        let [samples, histograms, taps, beats] =
+            [RecordKind::Samples, RecordKind::Histograms, RecordKind::Taps, RecordKind::Beats]
+                .map(is);
         // Both forms hold the same: the last one named counts.
         self.ticks = form.or(self.ticks);
         self.samples |= samples;
         self.histograms |= histograms;
         self.taps |= taps;
-        samples || histograms || taps || form.is_some()
+        self.beats |= beats;
+        samples || histograms || taps || beats || form.is_some()
     }
 
     /// Which of them `design` has, if any is asked for; or the sentence that says why none.
@@ -50,6 +53,7 @@ impl Records {
             (RecordKind::Samples, _) if self.samples => Ok(Some(Kept::Samples)),
             (RecordKind::Histograms, _) if self.histograms => Ok(Some(Kept::Histograms)),
             (RecordKind::Taps, _) if self.taps => Ok(Some(Kept::Taps)),
+            (RecordKind::Beats, _) if self.beats => Ok(Some(Kept::Beats)),
             (RecordKind::Ticks, Some(form)) => Ok(Some(Kept::Ticks(form))),
             _ if self.is_none() => Ok(None),
             (record, _) => {
@@ -82,7 +86,7 @@ impl Formats {
             |formats: &[Format]| formats.iter().map(|format| format.name()).collect::<Vec<_>>();
         let (known, default) = (names(Format::ALL), names(&Self::default().0));
         format!(
-            "Formats to write: {}, ticks, ticks-csv, samples, histograms, taps (shots, and what the \
+            "Formats to write: {}, ticks, ticks-csv, samples, histograms, taps, beats (shots, and what the \
              receiver is given of them, for `decode`), with commas between them, or none [default: {}]",
             known.join(", "),
             default.join(",")

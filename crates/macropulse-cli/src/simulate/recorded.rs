@@ -1,4 +1,4 @@
-//! Shots and their record, ticks, samples, histograms or taps, beside the points: what `decode` needs to find them again.
+//! Shots and their record, ticks, samples, histograms, taps or beats, beside the points: what `decode` needs to find them again.
 
 use std::collections::BTreeMap;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -7,8 +7,8 @@ use std::sync::{Mutex, PoisonError};
 
 use macropulse::codec;
 use macropulse::codec::files::{
-    Form, HistogramHeader, HistogramWriter, SampleHeader, SampleWriter, Shot, ShotHeader,
-    ShotWriter, TapHeader, TapWriter, TickHeader, TickWriter,
+    BeatHeader, BeatWriter, Form, HistogramHeader, HistogramWriter, SampleHeader, SampleWriter,
+    Shot, ShotHeader, ShotWriter, TapHeader, TapWriter, TickHeader, TickWriter,
 };
 use macropulse::design::Design;
 use macropulse::emit::{logs, scan_begins_fs, shots_of_scan};
@@ -29,6 +29,8 @@ pub enum Kept {
     Histograms,
     /// Taps; they and the shots in their binary form.
     Taps,
+    /// Beats; they and the shots in their binary form.
+    Beats,
 }
 
 impl Kept {
@@ -36,7 +38,7 @@ impl Kept {
     pub fn form(self) -> Form {
         match self {
             Self::Ticks(form) => form,
-            Self::Samples | Self::Histograms | Self::Taps => Form::Binary,
+            _ => Form::Binary,
         }
     }
 
@@ -48,6 +50,7 @@ impl Kept {
             Self::Samples => [("shots", "mps"), ("samples", "mpw")],
             Self::Histograms => [("shots", "mps"), ("histograms", "mph")],
             Self::Taps => [("shots", "mps"), ("taps", "mpa")],
+            Self::Beats => [("shots", "mps"), ("beats", "mpb")],
         };
         [shots, record].map(|(name, ending)| format!("{name}-{scan:06}.{ending}"))
     }
@@ -119,10 +122,11 @@ enum Header {
     Samples(SampleHeader),
     Histograms(HistogramHeader),
     Taps(TapHeader),
+    Beats(BeatHeader),
 }
 
 impl Header {
-    /// Writes it, with `count` ticks, blocks of samples, histograms or shots with taps to come.
+    /// Writes it, with `count` ticks, blocks of samples, histograms or shots with taps or beats to come.
     fn write(&mut self, out: &mut WholeFile, count: u64) -> io::Result<()> {
         match self {
             Self::Ticks(header, form) => {
@@ -141,11 +145,15 @@ impl Header {
                 header.count = Some(count);
                 TapWriter::new(out, header).map(|_| ())
             }
+            Self::Beats(header) => {
+                header.count = Some(count);
+                BeatWriter::new(out, header).map(|_| ())
+            }
         }
     }
 
     /// Appends what was recorded before the absolute tick `end` to `bytes`, and gives the number of ticks,
-    /// blocks of samples, histograms, or shots with taps.
+    /// blocks of samples, histograms, or shots with taps or beats.
     fn append(&self, record: &Record, end: i64, bytes: &mut Vec<u8>) -> io::Result<u64> {
         match (self, record.given) {
             (Self::Ticks(header, form), codec::Record::Ticks(ticks)) => {
@@ -167,6 +175,11 @@ impl Header {
                 let first = record.log.first + record.log.owned.start as u64;
                 TapWriter::behind(bytes).write(taps, first)?;
                 Ok((taps.codes.len() / header.taps.max(1) as usize) as u64)
+            }
+            (Self::Beats(_), codec::Record::Beats(beats)) => {
+                let first = record.log.first + record.log.owned.start as u64;
+                BeatWriter::behind(bytes).write(beats, first)?;
+                Ok(record.log.owned.len() as u64)
             }
             // A sensor gives what it is asked for, or it is not asked.
             _ => Ok(0),
@@ -210,7 +223,8 @@ impl<'a> RecordFiles<'a> {
         let samples = design.sample_header().map(Header::Samples);
         let histograms = design.histogram_header().map(Header::Histograms);
         let taps = design.tap_header().map(Header::Taps);
-        let mut header = samples.or(histograms).or(taps).unwrap_or_else(|| {
+        let beats = design.beat_header().map(Header::Beats);
+        let mut header = samples.or(histograms).or(taps).or(beats).unwrap_or_else(|| {
             Header::Ticks(recorded.header(scans.measure(), 0), recorded.kept.form())
         });
         header.write(&mut file, 0).map_err(|cause| file.failed(cause))?;

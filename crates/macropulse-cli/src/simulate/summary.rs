@@ -95,6 +95,7 @@ impl Run<'_> {
             RecordKind::Samples => counted(tally.samples, "sample"),
             RecordKind::Histograms => counted(tally.counts, "count"),
             RecordKind::Taps => counted(tally.taps, "tap"),
+            RecordKind::Beats => counted(tally.peaks, "peak"),
             RecordKind::Ticks => {
                 format!(
                     "{}, {}",

@@ -51,6 +51,7 @@ pages! {
     histograms: "docs/guide/histograms.md",
     interference: "docs/guide/interference.md",
     modulated_light: "docs/guide/modulated-light.md",
+    range_and_velocity: "docs/guide/range-and-velocity.md",
     never_waiting: "docs/guide/never-waiting.md",
     own_code: "docs/guide/own-code.md",
     own_scanner: "docs/guide/own-scanner.md",

@@ -1,5 +1,6 @@
-//! Ticks, samples, histograms or taps to returns: the receiver. It sees these and the shot log, never the scene.
+//! Ticks, samples, histograms, taps or beats to returns: the receiver. It sees these and the shot log, never the scene.
 
+pub mod beat;
 pub mod belief;
 pub mod histogram;
 pub mod phase;
@@ -21,6 +22,7 @@ mod threshold;
 mod timeline;
 mod timing;
 
+pub use beat::BeatMethod;
 pub use bitwise::{Bitwise, Opening};
 pub use error::Error;
 pub use explain::{Accepted, Explanation, OtherLight, Verdict};
@@ -77,6 +79,8 @@ pub enum Method {
     Histogram(HistogramMethod),
     /// Measures the phase of modulated light.
     Phase(PhaseMethod),
+    /// Measures the beat frequencies of light whose frequency is modulated.
+    Beat(BeatMethod),
 }
 
 /// Settings of a receiver that correlates ticks with known macropulses.
@@ -184,6 +188,8 @@ kinds! {
     Histogram, Self::Histogram(_) => "histogram", MOST_RETURNS;
     /// For modulated light: the phase of each modulation frequency, and the range that has all of them.
     Phase, Self::Phase(_) => "phase", 1;
+    /// For light whose frequency is modulated: the range and the radial velocity that the beats of both ramps have.
+    Beat, Self::Beat(_) => "beat", MOST_RETURNS;
 }
 
 impl ReceiverKind {
@@ -193,6 +199,7 @@ impl ReceiverKind {
             Self::Sampled => RecordKind::Samples,
             Self::Histogram => RecordKind::Histograms,
             Self::Phase => RecordKind::Taps,
+            Self::Beat => RecordKind::Beats,
             _ => RecordKind::Ticks,
         }
     }
@@ -223,7 +230,7 @@ impl Method {
     /// Ticks per chip of the code words; `None` without a code.
     pub fn ticks_per_chip(&self) -> Option<u32> {
         match self {
-            Self::Direct | Self::Histogram(_) | Self::Phase(_) => None,
+            Self::Direct | Self::Histogram(_) | Self::Phase(_) | Self::Beat(_) => None,
             Self::Bitwise(settings) => Some(settings.ticks_per_chip),
             Self::Matched(settings, _) | Self::Balanced(settings) => Some(settings.ticks_per_chip),
             Self::Sampled(settings) => Some(settings.ticks_per_chip),
@@ -253,6 +260,7 @@ impl Method {
             Self::Sampled(settings) => Some(settings.false_alarm),
             Self::Histogram(settings) => Some(settings.false_alarm),
             Self::Phase(settings) => Some(settings.false_alarm),
+            Self::Beat(settings) => Some(settings.false_alarm),
             _ => self.correlation().map(|correlation| correlation.false_alarm),
         }
     }
@@ -313,7 +321,7 @@ impl Receiver {
     }
 
     /// The returns of the owned shots of `log`, out of the `record` of its band: all its ticks, samples,
-    /// histograms or taps; ordered by shot, those of one shot by range.
+    /// histograms, taps or beats; ordered by shot, those of one shot by range.
     ///
     /// The record must cover the whole time in which light of an owned shot can arrive. Guard shots
     /// are decoded too, as their light overlaps, and dropped. Each channel is decoded by itself;
@@ -348,6 +356,9 @@ impl Receiver {
             (Record::Taps(taps), Method::Phase(settings)) => {
                 phase::decode_band(self, settings, log, taps)
             }
+            (Record::Beats(beats), Method::Beat(settings)) => {
+                beat::decode_band(self, settings, log, beats)
+            }
             (record, method) => Err(wrong(method, record.kind())),
         }
     }
@@ -361,9 +372,10 @@ impl Receiver {
     ) -> Result<Returns, Error> {
         let sent = (codebook, log);
         Ok(match &self.method {
-            method @ (Method::Sampled(_) | Method::Histogram(_) | Method::Phase(_)) => {
-                return Err(wrong(method, RecordKind::Ticks));
-            }
+            method @ (Method::Sampled(_)
+            | Method::Histogram(_)
+            | Method::Phase(_)
+            | Method::Beat(_)) => return Err(wrong(method, RecordKind::Ticks)),
             _ if ticks.tick.is_empty() || log.is_empty() => {
                 check::in_order(&ticks.tick, 0..ticks.tick.len())?;
                 self.nothing_of(log.owned.len())

@@ -56,6 +56,8 @@ pub struct Returns {
     /// Whether `photons` is a lower bound: no mark was missed, and no amplitude measured, or samples were
     /// clipped.
     pub saturated: Vec<bool>,
+    /// Radial velocity, m/s, positive of a surface that approaches; empty of a receiver that measures none.
+    pub radial_velocity: Vec<f32>,
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],
 }
@@ -99,6 +101,7 @@ impl Returns {
             margin: Vec::with_capacity(returns),
             photons: Vec::with_capacity(returns),
             saturated: Vec::with_capacity(returns),
+            radial_velocity: Vec::new(),
             rejects: Default::default(),
         }
     }

@@ -4,9 +4,11 @@ use std::collections::VecDeque;
 use std::io::Read;
 use std::ops::Range;
 
-use super::{Error, Histogram, HistogramReader, SampleBlock, SampleReader, TapReader, TickReader};
+use super::{
+    BeatReader, Error, Histogram, HistogramReader, SampleBlock, SampleReader, TapReader, TickReader,
+};
 use crate::ticks::{Tick, Ticks};
-use crate::{Given, Histograms, Samples, Taps};
+use crate::{Beats, Given, Histograms, Peak, Samples, Taps};
 
 /// Ticks of a band at most: 400 MB of them.
 const MOST_TICKS: usize = 1 << 24;
@@ -14,7 +16,7 @@ const MOST_TICKS: usize = 1 << 24;
 /// Samples of a band at most: 512 MB of them.
 const MOST_SAMPLES: usize = 1 << 28;
 
-/// Counts or taps of a band at most: 512 MB of them.
+/// Counts, taps or peaks of a band at most: a gigabyte of them.
 const MOST_COUNTS: usize = 1 << 27;
 
 /// A record under way.
@@ -24,11 +26,13 @@ pub(super) enum AtHand<R> {
     Samples(SamplesAtHand<R>),
     Histograms(EachShot<HistogramReader<R>, Histogram>),
     Taps(EachShot<TapReader<R>, Vec<u16>>),
+    Beats(EachShot<BeatReader<R>, Vec<Peak>>),
 }
 
 impl<R: Read> AtHand<R> {
     /// The record of the shots with the ids `owned`: that of the absolute ticks of `span`, which lie behind
-    /// those asked for before, times of ticks being counted from `epoch` on; or the histograms or taps of these shots.
+    /// those asked for before, times of ticks being counted from `epoch` on; or the histograms, taps or beats of these
+    /// shots.
     pub fn of(
         &mut self,
         owned: &Range<u64>,
@@ -38,6 +42,7 @@ impl<R: Read> AtHand<R> {
         match self {
             Self::Histograms(histograms) => Ok(Given::Histograms(histograms.of(owned)?)),
             Self::Taps(taps) => Ok(Given::Taps(taps.of(owned)?)),
+            Self::Beats(beats) => Ok(Given::Beats(beats.of(owned)?)),
             Self::Ticks(ticks) => Ok(Given::Ticks(ticks.of(span, epoch)?)),
             Self::Samples(samples) => Ok(Given::Samples(samples.of(span)?)),
         }
@@ -45,7 +50,7 @@ impl<R: Read> AtHand<R> {
 
     /// Whether it has a record for each shot, and no other.
     pub fn is_by_shot(&self) -> bool {
-        matches!(self, Self::Histograms(_) | Self::Taps(_))
+        matches!(self, Self::Histograms(_) | Self::Taps(_) | Self::Beats(_))
     }
 
     /// Reads to the end, so that what is wrong there is not passed over.
@@ -55,6 +60,7 @@ impl<R: Read> AtHand<R> {
             Self::Samples(samples) => while samples.reader.next_block()?.is_some() {},
             Self::Histograms(histograms) => while histograms.reader.next_histogram()?.is_some() {},
             Self::Taps(taps) => while taps.reader.next_shot()?.is_some() {},
+            Self::Beats(beats) => while beats.reader.next_shot()?.is_some() {},
         }
         Ok(())
     }
@@ -137,6 +143,26 @@ impl<R: Read> EachShot<TapReader<R>, Vec<u16>> {
             found.codes[at * each..(at + 1) * each].copy_from_slice(&codes);
         })?;
         Ok(found)
+    }
+}
+
+impl<R: Read> EachShot<BeatReader<R>, Vec<Peak>> {
+    /// The peaks of the shots `owned`: none of a shot without any.
+    fn of(&mut self, owned: &Range<u64>) -> Result<Beats, Error> {
+        let header = *self.reader.header();
+        let (shots, each) =
+            ((owned.end - owned.start) as usize, (header.ramps * header.peaks) as usize);
+        if shots.saturating_mul(each) > MOST_COUNTS {
+            return self.reader.refuse(format!(
+                "more than {MOST_COUNTS} peaks belong to shots that are decoded together"
+            ));
+        }
+        let found = vec![Peak::EMPTY; shots * each];
+        let mut beats = Beats { ramps: header.ramps, peaks: header.peaks, found };
+        self.each(owned, BeatReader::next_shot, |at, peaks| {
+            beats.found[at * each..(at + 1) * each].copy_from_slice(&peaks);
+        })?;
+        Ok(beats)
     }
 }
 

@@ -98,17 +98,17 @@ fn check_kind<R: Read>(source: &Source<R>, kind: &str) -> Result<(), Error> {
     let name = source.name();
     match kind {
         _ if kind == name => Ok(()),
-        "ticks" | "samples" | "histograms" | "taps" if source.what != What::Shots => source.refuse(format!(
+        "ticks" | "samples" | "histograms" | "taps" | "beats" if source.what != What::Shots => source.refuse(format!(
             "these are {kind}, where the sensor records {name}: is it the one that they were recorded \
              with?"
         )),
-        "shots" | "ticks" | "samples" | "histograms" | "taps" => {
+        "shots" | "ticks" | "samples" | "histograms" | "taps" | "beats" => {
             let behind = if source.what == What::Shots { kind } else { name };
             source.refuse(format!(
                 "these are {kind}, where {name} are wanted: the shot log comes first, then the {behind}"
             ))
         }
-        _ => source.refuse(format!("`{kind}` are neither shots nor ticks, samples, histograms or taps")),
+        _ => source.refuse(format!("`{kind}` are neither shots nor ticks, samples, histograms, taps or beats")),
     }
 }
 
@@ -194,9 +194,10 @@ pub(super) fn binary<R: Read>(source: &mut Source<R>) -> Result<[u8; HEADER], Er
         b"MPSAMPL\0" => "samples",
         b"MPHISTO\0" => "histograms",
         b"MPTAPS\0\0" => "taps",
+        b"MPBEATS\0" => "beats",
         _ => {
             return source.refuse(
-                "this is no file of Macropulse's shots, ticks, samples, histograms or taps",
+                "this is no file of Macropulse's shots, ticks, samples, histograms, taps or beats",
             );
         }
     };

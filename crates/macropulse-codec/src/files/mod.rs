@@ -1,15 +1,16 @@
-//! Shot logs, ticks, samples, histograms and taps as files and streams: the seam at which recorded hardware takes the
+//! Shot logs, ticks, samples, histograms, taps and beats as files and streams: the seam at which recorded hardware takes the
 //! place of a simulation.
 //!
 //! Shots and ticks have two forms that hold the same: **text**, lines of comma-separated whole numbers under a
 //! line that says what they are, and **binary**, little-endian records under a header. A reader
-//! tells them apart by their first byte. Samples, histograms and taps are binary. `docs/formats.md` has them byte by byte.
+//! tells them apart by their first byte. Samples, histograms, taps and beats are binary. `docs/formats.md` has them byte by byte.
 //!
 //! Readers and writers go over any [`Read`](std::io::Read) and [`Write`](std::io::Write), record by
 //! record, and keep none. [`Stream`] reads shots and their record at once and cuts them into bands to be decoded.
 //! What is wrong is told with the line or the byte where it stands.
 
 mod at_hand;
+mod beat_files;
 mod by_shot;
 mod head;
 mod histogram_files;
@@ -23,6 +24,7 @@ mod tick_files;
 use std::fmt;
 use std::io;
 
+pub use beat_files::{BeatHeader, BeatReader, BeatWriter};
 pub use histogram_files::{Histogram, HistogramHeader, HistogramReader, HistogramWriter};
 pub use sample_files::{SampleBlock, SampleHeader, SampleReader, SampleWriter};
 pub use shots::{Limits, Shot, ShotHeader, ShotReader, ShotWriter};
@@ -99,6 +101,8 @@ pub enum What {
     Histograms,
     /// The taps.
     Taps,
+    /// The beats.
+    Beats,
 }
 
 /// Why a file cannot be read.

@@ -63,6 +63,7 @@ impl<R: Read> Source<R> {
             What::Samples => "samples",
             What::Histograms => "histograms",
             What::Taps => "taps",
+            What::Beats => "beats",
         }
     }
 

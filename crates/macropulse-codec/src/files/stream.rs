@@ -5,7 +5,9 @@ use std::io::Read;
 use std::ops::Range;
 
 use super::at_hand::{AtHand, EachShot, SamplesAtHand, TicksAtHand};
-use super::{Error, HistogramReader, SampleReader, Shot, ShotReader, TapReader, TickReader};
+use super::{
+    BeatReader, Error, HistogramReader, SampleReader, Shot, ShotReader, TapReader, TickReader,
+};
 use crate::Given;
 use crate::cut::Cut;
 use crate::shot_log::ShotLog;
@@ -47,6 +49,11 @@ impl<S: Read, R: Read> Stream<S, R> {
     /// The bands of `shots` and `taps`, which are of a sensor that is `cut` so.
     pub fn of_taps(cut: Cut, shots: ShotReader<S>, taps: TapReader<R>) -> Self {
         Self::of(cut, shots, AtHand::Taps(EachShot::new(taps)))
+    }
+
+    /// The bands of `shots` and `beats`, which are of a sensor that is `cut` so.
+    pub fn of_beats(cut: Cut, shots: ShotReader<S>, beats: BeatReader<R>) -> Self {
+        Self::of(cut, shots, AtHand::Beats(EachShot::new(beats)))
     }
 
     fn of(cut: Cut, shots: ShotReader<S>, record: AtHand<R>) -> Self {

@@ -49,9 +49,16 @@ impl Figures<'_> {
         columns
     }
 
+    /// What photons are counted of: a mark, or the whole of a shot without pulses.
+    fn part(&self) -> &'static str {
+        if self.design.emission.is_pulsed() { "mark" } else { "shot" }
+    }
+
     fn light(&self) -> Columns {
         let mut columns = Columns::default();
         let there = &self.there;
+        let is_pulsed = self.design.emission.is_pulsed();
+        let part = self.part();
         match &self.design.budget {
             None => {
                 columns.push("energy", "unknown: the sensor is declared by what it can see");
@@ -62,9 +69,13 @@ impl Figures<'_> {
                 columns.push(
                     "energy",
                     format!(
-                        "{} nJ a shot of {} marks, {} mW on average, at {} nm",
+                        "{} nJ a shot{}, {} mW on average, at {} nm",
                         short(budget.energy * 1e9),
-                        short(marks),
+                        if is_pulsed {
+                            format!(" of {} marks", short(marks))
+                        } else {
+                            String::new()
+                        },
                         short(power * 1e3),
                         short(budget.wavelength * 1e9)
                     ),
@@ -81,23 +92,26 @@ impl Figures<'_> {
                 );
                 columns.push(
                     "photons",
-                    format!(
-                        "{} a shot, {} a mark",
-                        short(there.photons_per_shot),
-                        short(there.photons_per_shot / marks)
-                    ),
+                    match is_pulsed {
+                        true => format!(
+                            "{} a shot, {} a mark",
+                            short(there.photons_per_shot),
+                            short(there.photons_per_shot / marks)
+                        ),
+                        false => format!("{} a shot", short(there.photons_per_shot)),
+                    },
                 );
                 let chip = if self.design.is_coded() { "chip" } else { "tick" };
-                columns.push(
-                    "sunlight",
-                    format!("{} photons in every {chip}", short(self.background_per_chip())),
-                );
+                if is_pulsed {
+                    let photons = short(self.background_per_chip());
+                    columns.push("sunlight", format!("{photons} photons in every {chip}"));
+                }
             }
         }
         columns.push(
             "detected",
             match there.detected_per_mark.is_finite() {
-                true => format!("{} photons a mark", short(there.detected_per_mark)),
+                true => format!("{} photons a {part}", short(there.detected_per_mark)),
                 false => {
                     "every mark: the sensitivity has pd = 1, and so no scale of light".to_owned()
                 }
@@ -158,9 +172,10 @@ impl Figures<'_> {
                 metres(*range_at_night)
             );
         }
+        let part = self.part();
         let pd = self.wanted.pd;
         text += &format!(
-            "  photons a shot, detected a mark; range of Pd {pd} in {}, and at night\n",
+            "  photons a shot, detected a {part}; range of Pd {pd} in {}, and at night\n",
             self.environment.name
         );
         let method = &self.design.receiver.method;

@@ -218,6 +218,7 @@ pub fn manifest(run: &Run) -> Manifest {
         RecordKind::Ticks => &[("detections", tally.detections), ("ticks", tally.ticks)],
         RecordKind::Histograms => &[("counts", tally.counts)],
         RecordKind::Taps => &[("taps", tally.taps)],
+        RecordKind::Beats => &[("peaks", tally.peaks)],
     };
     for (name, count) in recorded.iter().chain(&[("returns", tally.returns)]) {
         manifest.counts.push(*name, *count);

@@ -18,7 +18,7 @@ use super::Error;
 pub const SHOTS: u64 = 20_000;
 
 /// The sensors that are tried.
-pub const SENSORS: [&str; 14] = [
+pub const SENSORS: [&str; 15] = [
     "kim-park-2016",
     "kim-park-2016-fixed",
     "coded-32",
@@ -33,6 +33,7 @@ pub const SENSORS: [&str; 14] = [
     "spad-spinning",
     "itof-camera",
     "amcw-scanner",
+    "fmcw-1550",
 ];
 
 /// The ready environment around them.

@@ -1,5 +1,6 @@
 //! Macropulse beside what others have published, and its forecasts beside its simulations.
 
+mod continuous;
 mod devices;
 mod forecasts;
 mod histograms;
@@ -88,6 +89,7 @@ pub fn published() -> Result<Vec<Figure>, Error> {
     all.extend(paper::paper()?);
     all.extend(simulated::simulated()?);
     all.extend(histograms::histograms()?);
+    all.extend(continuous::continuous()?);
     Ok(all)
 }
 

@@ -66,6 +66,9 @@ pub struct PulseTrains {
     /// First mark that takes this way and the one behind the last, by their place in the list of
     /// the macropulse; [`ALL_MARKS`] where all of them do.
     pub marks: Vec<[u16; 2]>,
+    /// How fast the surface approaches, m/s; empty where the light of no sensor shows it. Trains of the sensor itself come
+    /// first, and only they have one.
+    pub radial_velocity: Vec<f32>,
     /// Number of the shot by its transmitter's own count.
     pub shot: Vec<u64>,
     /// Which of the ways that light of this shot takes: with transmitter and shot the counter of

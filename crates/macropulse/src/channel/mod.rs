@@ -128,12 +128,16 @@ pub fn echoes(
     let lit = &trains.photons[from..];
     // Nearly always all of them.
     if lit.iter().all(|&photons| photons > 0.0) {
+        trains.radial_velocity.extend_from_slice(&hits.radial_velocity);
         return add_columns(trains, log, &hits.shot, &delay_fs);
     }
     let kept: Vec<usize> = (0..lit.len()).filter(|i| lit[*i] > 0.0).collect();
     let photons: Vec<f64> = kept.iter().map(|i| lit[*i]).collect();
     trains.photons.truncate(from);
     trains.photons.extend(photons);
+    if !hits.radial_velocity.is_empty() {
+        trains.radial_velocity.extend(kept.iter().map(|i| hits.radial_velocity[*i]));
+    }
     let shots: Vec<u32> = kept.iter().map(|i| hits.shot[*i]).collect();
     let delay_fs: Vec<i64> = kept.iter().map(|i| delay_fs[*i]).collect();
     add_columns(trains, log, &shots, &delay_fs);
@@ -275,6 +279,7 @@ mod tests {
             cosine: vec![1.0, 1.0, 0.5, 0.0],
             material: vec![0, 1, 0, 0],
             object: vec![0; 4],
+            ..Hits::default()
         };
         let log = crate::emit::Band { scan: 0, first: 0, shots: 10 }.shot_log(&design);
         let mut trains = PulseTrains::default();

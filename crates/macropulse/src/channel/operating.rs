@@ -64,13 +64,13 @@ impl Operating {
                         .to_owned(),
             });
         }
-        let is_modulated = |one: &&Interferer| one.design.emission.modulation().is_some();
+        let is_modulated = |one: &&Interferer| !one.design.emission.is_pulsed();
         if let Some(modulated) = scene.interferers.iter().find(is_modulated) {
             return Err(Error {
                 sensor: design.name.clone(),
                 environment: scene.name.clone(),
                 message: format!(
-                    "light of modulated lidars as `{}` is not followed to other sensors: take it out of \
+                    "light of lidars without pulses as `{}` is not followed to other sensors: take it out of \
                      [[interferers]]",
                     modulated.design.name
                 ),

@@ -50,10 +50,11 @@ pub struct Speckle {
 
 impl Speckle {
     /// That of a sensor whose aperture and beam are known, whether it is simulated or not: of a laser
-    /// whose line width is not said, that of its pulses.
+    /// whose line width is not said, that of its pulses. A coherent receiver sees one cell, which it follows itself.
     pub fn of(design: &Design) -> Option<Self> {
-        let budget = design.budget.as_ref().filter(|_| design.light.divergence > 0.0)?;
-        // Light that is modulated has no pulse, and the line of its laser is narrow beside that of one.
+        let is_seen = design.light.divergence > 0.0 && design.emission.chirp().is_none();
+        let budget = design.budget.as_ref().filter(|_| is_seen)?;
+        // Light without pulses has a narrow line.
         let pulse = match design.light.pulse {
             0.0 => 0.0,
             pulse => TIME_BANDWIDTH / pulse,

@@ -40,10 +40,10 @@ impl Design {
     pub fn cut(&self) -> Cut {
         let jitter_fs = self.most_jitter_fs();
         // Light is looked for to twice the gate: what arrives in it is that of shots the receiver knows. A
-        // histogram, or taps, have the light of their own shot, and nothing before it.
+        // histogram, taps or beats have the light of their own shot, and nothing before it.
         let lead_fs = match self.records() {
             RecordKind::Ticks | RecordKind::Samples => 2 * self.listening_fs() + jitter_fs,
-            RecordKind::Histograms | RecordKind::Taps => 0,
+            RecordKind::Histograms | RecordKind::Taps | RecordKind::Beats => 0,
         };
         let model = self.detector.model();
         let under_way_fs = self.light_fs() + jitter_fs + model.settles_fs();
@@ -72,7 +72,7 @@ impl Design {
     }
 
     /// The longest time from the first to the last shot of a band without its guard shots, fs; negative
-    /// where not even one shot has room. Histograms and taps are no events that are timed.
+    /// where not even one shot has room. Histograms, taps and beats are no events that are timed.
     pub fn longest_band_fs(&self) -> i64 {
         if self.records().is_by_shot() {
             return i64::MAX;

@@ -1,11 +1,11 @@
-//! What a shot sends: a macropulse, a burst of equal pulses, `[burst]`, or modulated light.
+//! What a shot sends: a macropulse, a burst of equal pulses, `[burst]`, or light whose power or frequency is modulated.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::limits::Check;
-use super::{Clock, Coding, Error, Modulation};
-use crate::units::fs_from_s;
+use super::{Chirp, Clock, Coding, Error, Modulation};
+use crate::units::{fs_from_s, s_from_fs};
 
 /// What a shot sends.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +16,8 @@ pub enum Emission {
     Burst(Burst),
     /// Light whose power is modulated.
     Modulated(Modulation),
+    /// Light whose frequency is modulated.
+    Chirped(Chirp),
 }
 
 /// Equal pulses at a fixed interval.
@@ -30,12 +32,13 @@ pub struct Burst {
 }
 
 impl Emission {
-    /// The code words, or the single pulse, that are sent once or repeatedly; of modulated light its beginning.
+    /// The code words, or the single pulse, that are sent once or repeatedly; of light without pulses its beginning.
     pub fn coding(&self) -> &Coding {
         match self {
             Self::Marks(coding) => coding,
             Self::Burst(burst) => &burst.pulse,
             Self::Modulated(modulation) => &modulation.shot,
+            Self::Chirped(chirp) => &chirp.shot,
         }
     }
 
@@ -43,16 +46,29 @@ impl Emission {
     pub fn burst(&self) -> Option<&Burst> {
         match self {
             Self::Burst(burst) => Some(burst),
-            Self::Marks(_) | Self::Modulated(_) => None,
+            _ => None,
         }
     }
 
-    /// The modulation, if its light is modulated.
+    /// The modulation, if the power of its light is modulated.
     pub fn modulation(&self) -> Option<&Modulation> {
         match self {
             Self::Modulated(modulation) => Some(modulation),
-            Self::Marks(_) | Self::Burst(_) => None,
+            _ => None,
         }
+    }
+
+    /// The chirp, if the frequency of its light is modulated.
+    pub fn chirp(&self) -> Option<&Chirp> {
+        match self {
+            Self::Chirped(chirp) => Some(chirp),
+            _ => None,
+        }
+    }
+
+    /// Whether it sends pulses.
+    pub fn is_pulsed(&self) -> bool {
+        matches!(self, Self::Marks(_) | Self::Burst(_))
     }
 
     /// Whether shots carry a code.
@@ -62,8 +78,10 @@ impl Emission {
 
     /// Time from the beginning of a shot's first chip to the end of its last one, fs.
     pub fn length_fs(&self) -> i64 {
-        if let Self::Modulated(modulation) = self {
-            return modulation.length_fs();
+        match self {
+            Self::Modulated(modulation) => return modulation.length_fs(),
+            Self::Chirped(chirp) => return chirp.length_fs(),
+            Self::Marks(_) | Self::Burst(_) => {}
         }
         let coding = self.coding();
         let word = i64::from(coding.codebook.chips()) * coding.chip_fs;
@@ -77,15 +95,24 @@ impl Emission {
         self.coding().chip_fs
     }
 
-    /// Pulses of a shot, the mean over its labels and words; 1 of modulated light.
+    /// Pulses of a shot, the mean over its labels and words; 1 of light without pulses.
     pub fn mean_pulses(&self) -> f64 {
         let repeats = self.burst().map_or(1, |burst| burst.pulses);
         self.coding().codebook.mean_weight() * f64::from(repeats)
     }
 
-    /// Parts of a shot that are sent one by one, the mean over its labels and words: pulses, or exposures.
+    /// Parts of a shot that are sent one by one, the mean over its labels and words: pulses, exposures, or the whole shot.
     pub fn mean_parts(&self) -> f64 {
         self.modulation().map_or_else(|| self.mean_pulses(), |it| f64::from(it.taps()))
+    }
+
+    /// How long a part lasts, fs, where it is not a pulse.
+    pub fn part_fs(&self) -> Option<i64> {
+        match self {
+            Self::Marks(_) | Self::Burst(_) => None,
+            Self::Modulated(modulation) => Some(modulation.exposure_fs),
+            Self::Chirped(chirp) => Some(chirp.length_fs()),
+        }
     }
 
     /// The largest share of a shot's energy that is sent within `seconds`, taking all of its marks
@@ -98,6 +125,7 @@ impl Emission {
                 (within as f64 / f64::from(burst.pulses)).min(1.0)
             }
             Self::Modulated(modulation) => modulation.share_within(seconds),
+            Self::Chirped(chirp) => (seconds / s_from_fs(chirp.length_fs())).min(1.0),
         }
     }
 }

@@ -24,7 +24,7 @@ pub(super) struct LightFile {
     /// `idealised` names `footprint`.
     #[schemars(extend("enum" = [1, 7, 19]))]
     footprint_rays: u32,
-    /// Length of a micropulse, ps, full width at half maximum; left out with a [modulation].
+    /// Length of a micropulse, ps, full width at half maximum; left out of light without pulses.
     #[schemars(range(min = 0.001, max = 1e9))]
     pulse_ps: Option<f64>,
     /// Spectral width of the laser's line, GHz, full width at half maximum: with it echoes have speckle; left
@@ -58,7 +58,7 @@ pub struct Light {
     pub divergence: f64,
     /// Rays that sample the footprint: 1, 7 or 19.
     pub footprint_rays: u32,
-    /// Length of one micropulse (full width at half maximum), s; 0 of modulated light.
+    /// Length of one micropulse (full width at half maximum), s; 0 of light without pulses.
     pub pulse: f64,
     /// Spectral width of the laser's line (full width at half maximum), Hz, where speckle is simulated.
     pub linewidth: Option<f64>,
@@ -71,7 +71,7 @@ impl Check<'_> {
     pub(in crate::design) fn light(
         &self,
         light: &LightFile,
-        is_modulated: bool,
+        is_pulsed: bool,
         off: impl Fn(Effect) -> bool,
     ) -> Result<Light, Error> {
         let footprint_off = off(Effect::Footprint);
@@ -89,7 +89,7 @@ impl Check<'_> {
             );
         }
         let pulse = match light.pulse_ps {
-            _ if is_modulated => 0.0,
+            _ if !is_pulsed => 0.0,
             Some(typed) => self.within("light.pulse_ps", typed, 1e-3, 1e9)? * 1e-12,
             None => return Err(self.chain.lacks("light.pulse_ps", "missing field `pulse_ps`")),
         };

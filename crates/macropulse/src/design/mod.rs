@@ -11,6 +11,7 @@
 mod band;
 mod budget;
 mod check;
+mod chirp;
 mod coding;
 mod derived;
 pub mod detector;
@@ -35,6 +36,7 @@ use std::sync::OnceLock;
 
 pub use band::{MOST_SIGMA, PARTS_OF_TICK};
 pub use budget::{Budget, CoScanned, Field, solid_angle};
+pub use chirp::{Chirp, ChirpError};
 pub use coding::{Coding, Label};
 pub use derived::Derived;
 pub use detector::Detector;
@@ -45,7 +47,7 @@ pub use family::family_from_toml;
 pub use light::Light;
 pub use modulation::{Modulation, Wave};
 pub use presets::{names as preset_names, text as preset_text};
-pub use readout::{Clock, Histogram, Readout, Tdc};
+pub use readout::{Clock, Fidelity, Histogram, Readout, Spectrum, Tdc};
 pub use scan::{
     Directions, Extent, Firing, Flash, Gates, Grid, Laser, Mirror, Pattern, Polygon, Prism, Raster,
     Rosette, Scan, Spinning, Table,

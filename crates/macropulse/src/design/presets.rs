@@ -3,7 +3,7 @@
 /// What a sensor file may leave unsaid.
 pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
 
-const PRESETS: [(&str, &str); 19] = [
+const PRESETS: [(&str, &str); 20] = [
     ("kim-park-2016", include_str!("../../../../sensors/kim-park-2016.toml")),
     ("kim-park-2016-fixed", include_str!("../../../../sensors/kim-park-2016-fixed.toml")),
     ("kim-park-2016-physical", include_str!("../../../../sensors/kim-park-2016-physical.toml")),
@@ -23,6 +23,7 @@ const PRESETS: [(&str, &str); 19] = [
     ("itof-camera", include_str!("../../../../sensors/itof-camera.toml")),
     ("kinect-v2", include_str!("../../../../sensors/kinect-v2.toml")),
     ("amcw-scanner", include_str!("../../../../sensors/amcw-scanner.toml")),
+    ("fmcw-1550", include_str!("../../../../sensors/fmcw-1550.toml")),
 ];
 
 /// Names of the ready sensors.

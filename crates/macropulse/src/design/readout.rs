@@ -1,17 +1,18 @@
-//! What a sensor records, and the clock by which it does: `[tdc]`, `[adc]`, `[histogram]`, or the taps of modulated
-//! light.
+//! What a sensor records, and the clock by which it does: `[tdc]`, `[adc]`, `[histogram]`, `[spectrum]`, or the taps
+//! of modulated light.
 
 use std::sync::Arc;
 
 use macropulse_codec::RecordKind;
+use macropulse_codec::decode::beat::SpectralWindow;
 use macropulse_codec::decode::histogram::Pulse;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::band::TOO_FINE;
 use super::limits::Check;
-use super::{Error, Scan};
-use crate::units::{FS_PER_S, fs_from_s};
+use super::{Chirp, Error, Scan};
+use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 
 /// `[tdc]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -55,6 +56,8 @@ pub enum Readout {
     Histogram(Histogram),
     /// A converter for each detector that reads its taps.
     Taps,
+    /// A converter for each detector, and the peaks of the spectra of its samples.
+    Spectrum(Spectrum),
 }
 
 impl Readout {
@@ -62,7 +65,7 @@ impl Readout {
     pub fn tdc(&self) -> Option<&Tdc> {
         match self {
             Self::Tdc(tdc) => Some(tdc),
-            Self::Adc | Self::Histogram(_) | Self::Taps => None,
+            _ => None,
         }
     }
 
@@ -70,7 +73,7 @@ impl Readout {
     pub fn histogram(&self) -> Option<&Histogram> {
         match self {
             Self::Histogram(histogram) => Some(histogram),
-            Self::Tdc(_) | Self::Adc | Self::Taps => None,
+            _ => None,
         }
     }
 
@@ -81,6 +84,7 @@ impl Readout {
             Self::Adc => RecordKind::Samples,
             Self::Histogram(_) => RecordKind::Histograms,
             Self::Taps => RecordKind::Taps,
+            Self::Spectrum(_) => RecordKind::Beats,
         }
     }
 
@@ -91,6 +95,7 @@ impl Readout {
             Self::Adc => "adc.sample_ps",
             Self::Histogram(_) => "histogram.bin_ps",
             Self::Taps => "modulation",
+            Self::Spectrum(_) => "chirp",
         }
     }
 
@@ -163,6 +168,69 @@ pub(super) struct HistogramFile {
     pub pulse: Option<Vec<f64>>,
 }
 
+/// `[spectrum]` as typed.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SpectrumFile {
+    /// Samples taken per second, in millions.
+    #[schemars(range(min = 0.001, max = 1e6))]
+    sample_msps: f64,
+    /// The window over a ramp.
+    window: SpectralWindow,
+    /// Peaks recorded of a ramp at most, the strongest ones.
+    #[schemars(range(min = 1, max = 256))]
+    peaks: u32,
+    /// Peaks of noise that are recorded of a ramp on average; the least power that is recorded follows from it.
+    #[schemars(range(min = 1e-9, max = 100))]
+    false_peaks: f64,
+    /// How spectra are simulated. Left out: `waveform`.
+    fidelity: Option<Fidelity>,
+}
+
+/// How spectra are simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fidelity {
+    /// Sample by sample.
+    Waveform,
+    /// Bin by bin, and only where there is something to see: much faster, and for ideal chirps alone.
+    Spectrum,
+}
+
+/// The spectra of the ramps of a shot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spectrum {
+    /// Samples taken per second.
+    pub sample_hz: f64,
+    /// The window over a ramp.
+    pub window: SpectralWindow,
+    /// Peaks recorded of a ramp at most.
+    pub peaks: u32,
+    /// Peaks of noise that are recorded of a ramp on average.
+    pub false_peaks: f64,
+    /// How it is simulated.
+    pub fidelity: Fidelity,
+}
+
+/// Samples of a ramp: at least and at most.
+const SAMPLES: (f64, f64) = (64.0, 65_536.0);
+
+impl Spectrum {
+    /// Samples of a ramp that is recorded for so many seconds.
+    pub fn samples(&self, seconds: f64) -> u32 {
+        (self.sample_hz * seconds).round() as u32
+    }
+
+    /// By how much less precisely a beat is measured behind the window than by all samples alike. For a window w(t) it is
+    /// √(∫w²t² dt·∫t² dt)/∫w·t² dt.
+    pub fn loss_of_precision(&self) -> f64 {
+        match self.window {
+            SpectralWindow::None => 1.0,
+            SpectralWindow::Hann => 1.530_3,
+        }
+    }
+}
+
 /// Tick of the clock of a sensor of modulated light, fs: no time is measured by it, and its range gate ends to 1.5 mm.
 const TICK_OF_TAPS_FS: i64 = 10_000;
 
@@ -197,6 +265,64 @@ impl Check<'_> {
     pub(super) fn adc(&self, file: &AdcFile) -> Result<(Clock, Readout), Error> {
         let tick_fs = self.whole_fs("adc.sample_ps", file.sample_ps)?;
         Ok((Clock { tick_fs, period_fs: tick_fs }, Readout::Adc))
+    }
+
+    /// Clock and readout of a detector of whose samples spectra are taken.
+    pub(super) fn spectrum(&self, file: &SpectrumFile) -> Result<(Clock, Readout), Error> {
+        let msps = self.within("spectrum.sample_msps", file.sample_msps, 1e-3, 1e6)?;
+        let spectrum = Spectrum {
+            sample_hz: msps * 1e6,
+            window: file.window,
+            peaks: self.count("spectrum.peaks", file.peaks, 1, 256)?,
+            false_peaks: self.within("spectrum.false_peaks", file.false_peaks, 1e-9, 100.0)?,
+            fidelity: file.fidelity.unwrap_or(Fidelity::Waveform),
+        };
+        Ok((self.of_taps().0, Readout::Spectrum(spectrum)))
+    }
+
+    /// Whether a `spectrum` holds the beats of the ramps of a `chirp`, light of surfaces up to `farthest` metres that move
+    /// by `fastest` m/s, at this wavelength.
+    pub(super) fn bins(
+        &self,
+        spectrum: &Spectrum,
+        chirp: &Chirp,
+        (farthest, fastest, wavelength): (f64, f64, f64),
+    ) -> Result<(), Error> {
+        let key = "spectrum.sample_msps";
+        for ramp in chirp.ramps() {
+            let (samples, (least, most)) = (spectrum.sample_hz * ramp.seconds, SAMPLES);
+            if !(least..=most).contains(&samples) {
+                let message = format!(
+                    "takes {samples:.0} samples of a ramp of {} µs, where {least} to {most} are possible",
+                    ramp.seconds * 1e6
+                );
+                return self.refuse(key, message);
+            }
+            if (samples - samples.round()).abs() > 1e-3 {
+                let message = format!(
+                    "takes {samples:.3} samples of a ramp of {} µs: choose it so that this is a whole number",
+                    ramp.seconds * 1e6
+                );
+                return self.refuse(key, message);
+            }
+            let highest = ramp.slope() * tof_from_range(farthest) + 2.0 * fastest / wavelength;
+            if 2.0 * highest > spectrum.sample_hz {
+                let message = format!(
+                    "is {}, but the beat of a surface at {farthest} m that moves by {fastest} m/s is {:.1} MHz: \
+                     {:.1} or more",
+                    spectrum.sample_hz * 1e-6,
+                    highest * 1e-6,
+                    (2.0 * highest * 1e-5).ceil() * 0.1
+                );
+                return self.refuse(key, message);
+            }
+        }
+        if spectrum.fidelity == Fidelity::Spectrum && !chirp.is_ideal() {
+            let message = "`spectrum` is exact for ideal chirps alone: `waveform`, or chirp.linewidth_khz and \
+                           chirp.error_mhz of 0";
+            return self.refuse("spectrum.fidelity", message);
+        }
+        Ok(())
     }
 
     /// Clock and readout of a detector whose taps are read.

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::detector::{Arming, DetectorFile, Geiger, LockIn, Sampled};
+use super::detector::{Arming, Coherent, DetectorFile, Geiger, LockIn, Sampled};
 use super::limits::Check;
 use super::{Clock, Coding, Emission, Error, Label, PARTS_OF_TICK, Readout, Scan};
 use crate::units::{fs_from_s, tof_from_range};
@@ -18,6 +18,9 @@ use macropulse_codec::decode::{
 /// any shot.
 const LEAST_MARKS: u32 = 2;
 
+/// Radial velocity at most, m/s, if a file does not say: of two cars at 108 km/h that meet.
+const MAX_SPEED: f64 = 60.0;
+
 /// `[receiver]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -26,7 +29,7 @@ pub(super) struct ReceiverFile {
     pub kind: ReceiverKind,
     /// How much the receiver `matched` does for faint light.
     effort: Effort,
-    /// False returns accepted per shot (matched, balanced, sampled, histogram, phase).
+    /// False returns accepted per shot (matched, balanced, sampled, histogram, phase, beat).
     #[schemars(range(min = 1e-30, max = 0.5))]
     false_alarm: f64,
     /// Marks that make a bit a 1 (literal, blind).
@@ -57,13 +60,16 @@ pub(super) struct ReceiverFile {
     /// Standard deviation of the shape of a pulse, as a share of its height (histogram); 0 if it is not given.
     #[schemars(range(min = 0, max = 1))]
     shape_error: Option<f64>,
-    /// A return with less than this share of the photons of the strongest one is not given (histogram); 0 if it
-    /// is not given.
+    /// A return with less than this share of the photons of the strongest one is not given (histogram), or a peak of
+    /// the power (beat); 0 if it is not given.
     #[schemars(range(min = 0, max = 1))]
     least_share: Option<f64>,
     /// Whether the error that harmonics of the modulation make of a phase is corrected (phase); true if it is not
     /// given.
     correct_harmonics: Option<bool>,
+    /// Radial velocity of a surface at most, m/s (beat); 60 if it is not given.
+    #[schemars(range(min = 0, max = 1e4))]
+    max_speed_m_s: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -76,19 +82,29 @@ enum PileUpFile {
 }
 
 /// The keys that only some kinds of receivers have: which, whose, and why no others.
-pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 6] = {
-    use ReceiverKind::{Balanced, Blind, Histogram, Literal, Matched, Phase, Sampled};
+pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 8] = {
+    use ReceiverKind::{Balanced, Beat, Blind, Histogram, Literal, Matched, Phase, Sampled};
     let of_samples = &["receiver.least_marks", "receiver.blank_ns", "receiver.recovery_ns"];
-    let of_counts = &["receiver.pile_up", "receiver.shape_error", "receiver.least_share"];
-    let deciding = "only `matched`, `balanced`, `sampled`, `histogram` and `phase` derive their threshold from it";
+    let of_counts = &["receiver.pile_up", "receiver.shape_error"];
+    let deciding = "only `matched`, `balanced`, `sampled`, `histogram`, `phase` and `beat` derive their threshold from it";
     let bitwise = "only `literal` and `blind` decide bit by bit";
     [
         (&["receiver.bit_threshold"], &[Literal, Blind], bitwise),
-        (&["receiver.false_alarm"], &[Matched, Balanced, Sampled, Histogram, Phase], deciding),
+        (
+            &["receiver.false_alarm"],
+            &[Matched, Balanced, Sampled, Histogram, Phase, Beat],
+            deciding,
+        ),
         (of_samples, &[Sampled], "only `sampled` is given samples"),
         (of_counts, &[Histogram], "only `histogram` is given counts"),
+        (
+            &["receiver.least_share"],
+            &[Histogram, Beat],
+            "only `histogram` and `beat` compare returns",
+        ),
         (&["receiver.effort"], &[Matched], "only `matched` searches"),
         (&["receiver.correct_harmonics"], &[Phase], "only `phase` is given taps"),
+        (&["receiver.max_speed_m_s"], &[Beat], "only `beat` measures a speed"),
     ]
 };
 
@@ -109,6 +125,8 @@ pub(super) struct Inputs<'a> {
     pub counting: Option<&'a Geiger>,
     /// The detector, where its taps are read.
     pub lock_in: Option<&'a LockIn>,
+    /// The detector, where its beats are recorded.
+    pub coherent: Option<&'a Coherent>,
     /// rms length of a pulse of light with the jitter, s.
     pub pulse: f64,
 }
@@ -126,8 +144,8 @@ impl Check<'_> {
         if kind.record() != readout.records() {
             return self.refuse(
                 "receiver.kind",
-                "`sampled` is for an [adc], `histogram` for a [histogram], `phase` for a [modulation], the other \
-                 receivers for events that a [tdc] times",
+                "`sampled` is for an [adc], `histogram` for a [histogram], `phase` for a [modulation], `beat` for a \
+                 [chirp], the other receivers for events that a [tdc] times",
             );
         }
         let is_coded = coding.label.is_some();
@@ -199,6 +217,18 @@ impl Check<'_> {
                 return Ok(inputs
                     .lock_in
                     .map(|it| Method::Phase(it.method(corrects, false_alarm))));
+            }
+            ReceiverKind::Beat => {
+                let Some(coherent) = inputs.coherent else { return Ok(None) };
+                let path = "receiver.max_speed_m_s";
+                let fastest = file.max_speed_m_s.unwrap_or(MAX_SPEED);
+                let fastest = self.within(path, fastest, 0.0, 1e4)?;
+                let share = file.least_share.unwrap_or(0.0);
+                let share = self.within("receiver.least_share", share, 0.0, 1.0)?;
+                let method = coherent.method(share, fastest, false_alarm);
+                let edge = (inputs.scan.max_range, fastest, coherent.wavelength);
+                self.bins(&coherent.spectrum, &coherent.chirp, edge)?;
+                Method::Beat(method)
             }
             ReceiverKind::Sampled => {
                 let Some(sampled) = sampled else { return Ok(None) };

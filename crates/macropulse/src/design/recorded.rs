@@ -1,7 +1,9 @@
 //! What recorded shots, ticks and samples are held against before they are decoded.
 
 use macropulse_codec::decode::{self, Returns};
-use macropulse_codec::files::{Digest, HistogramHeader, Limits, SampleHeader, TapHeader};
+use macropulse_codec::files::{
+    BeatHeader, Digest, HistogramHeader, Limits, SampleHeader, TapHeader,
+};
 use macropulse_codec::{Record, RecordKind, ShotLog};
 
 use super::Design;
@@ -29,11 +31,14 @@ impl Design {
     }
 
     /// The part of the `log` of a band that its receiver is given with the record: the shots all of whose light is in
-    /// it. A histogram, or taps, are those of their own shot, so that no others are.
+    /// it. Histograms, taps and beats are those of their own shot, so
+    /// that no others are.
     pub fn known(&self, log: &ShotLog) -> ShotLog {
         match self.records() {
             RecordKind::Ticks | RecordKind::Samples => self.cut().known(log),
-            RecordKind::Histograms | RecordKind::Taps => log.part(log.owned.clone()),
+            RecordKind::Histograms | RecordKind::Taps | RecordKind::Beats => {
+                log.part(log.owned.clone())
+            }
         }
     }
 
@@ -81,6 +86,17 @@ impl Design {
         Some(TapHeader { taps, digest: Some(self.recorded_digest()), count: None })
     }
 
+    /// What is said of its beats before they come, their number left open; `None` of a sensor that records none.
+    pub fn beat_header(&self) -> Option<BeatHeader> {
+        let Detector::Coherent(coherent) = &self.detector else { return None };
+        Some(BeatHeader {
+            ramps: coherent.chirp.ramps().len() as u32,
+            peaks: coherent.spectrum.peaks,
+            digest: Some(self.recorded_digest()),
+            count: None,
+        })
+    }
+
     /// The hash of all that is sent and how it is timed: the codebook chip by chip, the lengths of
     /// chips and ticks, which pixel is sent what, and when. What the receiver is set to, its gate
     /// included, is not in it: the same record may be decoded in many ways.
@@ -121,6 +137,11 @@ impl Design {
             numbers(&[modulation.phases.into(), modulation.exposure_fs as u64]);
             numbers(&[modulation.gap_fs as u64, modulation.wave as u64]);
             modulation.hz.iter().for_each(|hz| numbers(&[hz.to_bits()]));
+        }
+        if let Detector::Coherent(coherent) = &self.detector {
+            let chirp = &coherent.chirp;
+            numbers(&[chirp.up_fs as u64, chirp.down_fs as u64, chirp.settle_fs as u64]);
+            numbers(&[chirp.bandwidth.to_bits(), coherent.spectrum.window as u64]);
         }
         for sample in 0..SAMPLES.min(shots) {
             let order = sample * shots / SAMPLES.min(shots);

@@ -6,6 +6,7 @@
 mod baseline;
 mod channel;
 mod clock;
+mod coherent;
 mod colour;
 mod first_photon;
 mod geiger;
@@ -27,10 +28,11 @@ use std::ops::Range;
 
 pub use marks::{Marks, Response};
 
-use macropulse_codec::{Histograms, Samples, ShotLog, Taps};
+use macropulse_codec::{Beats, Histograms, Samples, ShotLog, Taps};
 
 use channel::{Arrangement, Channel};
 use clock::Clock;
+use coherent::Mixer;
 use geiger::Cells;
 use histogram::Accumulator;
 use linear::Thresholding;
@@ -80,6 +82,8 @@ enum Work {
     Histograms(Box<Accumulator>),
     /// Taps.
     Taps(Box<Demodulator>),
+    /// Beats.
+    Beats(Box<Mixer>),
 }
 
 /// A kind of detector at work.
@@ -131,6 +135,10 @@ impl<'a> Detectors<'a> {
                 let work = Box::new(Demodulator::new(lock_in, design));
                 return Self { design, chance, shape: None, work: Work::Taps(work) };
             }
+            Detector::Coherent(coherent) => {
+                let work = Box::new(Mixer::new(coherent, design, sunlight));
+                return Self { design, chance, shape: None, work: Work::Beats(work) };
+            }
             Detector::SingleStop(firing) => Box::new(firing.setting(sunlight)),
             Detector::Sampled(sampled) => {
                 let sampler = Box::new(Sampler::new(sampled, design, sunlight));
@@ -163,11 +171,11 @@ impl<'a> Detectors<'a> {
     /// fired; `None` of detectors that are not sampled.
     pub fn samples(&self, log: &ShotLog, light: &Light, span: &Range<i64>) -> Option<Samples> {
         match &self.work {
-            Work::Events(_) | Work::Histograms(_) | Work::Taps(_) => None,
             Work::Samples(sampler) => {
                 let light = &light.with_responses(log);
                 Some(sampler.samples((self.design, &self.chance), (log, light), span))
             }
+            _ => None,
         }
     }
 
@@ -183,6 +191,14 @@ impl<'a> Detectors<'a> {
     pub fn taps(&self, log: &ShotLog, light: &Light) -> Option<Taps> {
         match &self.work {
             Work::Taps(work) => Some(work.taps(&self.chance, log, light)),
+            _ => None,
+        }
+    }
+
+    /// The beats of the owned shots of `log`; `None` of detectors that have none.
+    pub fn beats(&self, log: &ShotLog, light: &Light) -> Option<Beats> {
+        match &self.work {
+            Work::Beats(work) => Some(work.beats(&self.chance, log, light)),
             _ => None,
         }
     }

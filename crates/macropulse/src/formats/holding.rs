@@ -67,13 +67,15 @@ impl Format {
         attributes.map(|attribute| attribute.name()).chain(further.map(Further::name)).collect()
     }
 
-    /// Which attributes of the truth cannot be written in this format of clouds; of an image of ranges
-    /// none is expected.
-    pub fn leaves_out_of_truth(self) -> Vec<&'static str> {
+    /// Which attributes of the truth cannot be written in this format of clouds, with velocities where the sensor `shows`
+    /// them; of an image of ranges none is expected.
+    pub fn leaves_out_of_truth(self, shows: bool) -> Vec<&'static str> {
         if matches!(self, Self::Png | Self::RangeNpy) {
             return Vec::new();
         }
-        let truth = Attribute::in_files().filter(|attribute| attribute.is_true());
+        let is_there =
+            |attribute: &Attribute| attribute.is_true() && (shows || attribute.comes_with_truth());
+        let truth = Attribute::in_files().filter(is_there);
         let left_out = truth.filter(|attribute| self.holds(*attribute) == Holding::Not);
         left_out.map(Attribute::name).collect()
     }
@@ -149,7 +151,7 @@ fn osi(attribute: Attribute) -> Holding {
     match attribute {
         Attribute::X | Attribute::Y | Attribute::Z => Partly("as distance, azimuth, elevation"),
         Attribute::Intensity => Partly("`reflectivity`; `intensity` in percent"),
-        Attribute::Range => Whole,
+        Attribute::Range | Attribute::RadialVelocity => Whole,
         Attribute::Row | Attribute::Ring => Partly("`beam_id`"),
         Attribute::TimeNs => Partly("of the scan alone"),
         Attribute::TrueRange => Partly("`time_of_flight` of a reflection"),
@@ -238,14 +240,15 @@ mod tests {
             format.leaves_out(cloud, &Names::default())
         }
         let truth = ["true_range", "object", "material", "incidence", "outcome"];
-        assert_eq!(Format::Kitti.leaves_out_of_truth(), truth);
+        assert_eq!(Format::Kitti.leaves_out_of_truth(false), truth);
+        assert!(Format::Kitti.leaves_out_of_truth(true).contains(&"true_radial_velocity"));
         let told = left_out(Format::Kitti, &cloud);
         let expected = ["outcome", "pixels without a return", "pose of the sensor"];
         assert_eq!(told[told.len() - 3..], expected);
         cloud.truth = Truth::default();
         assert!(!left_out(Format::Kitti, &cloud).contains(&"outcome"));
         assert!(left_out(Format::Pcd, &cloud).is_empty());
-        assert!(Format::Pcd.leaves_out_of_truth().is_empty());
-        assert!(Format::Png.leaves_out_of_truth().is_empty());
+        assert!(Format::Pcd.leaves_out_of_truth(true).is_empty());
+        assert!(Format::Png.leaves_out_of_truth(true).is_empty());
     }
 }

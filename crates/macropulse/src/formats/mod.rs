@@ -182,6 +182,7 @@ fn sample_cloud() -> PointCloud {
                     Outcome::False,
                 ],
             },
+            ..Truth::default()
         },
         ..PointCloud::default()
     }

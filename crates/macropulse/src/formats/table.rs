@@ -424,7 +424,7 @@ impl Gathered {
             match attribute.storage() {
                 Storage::Code(_) => cloud.truth.returns.push(record.surface()),
                 // The truth is added with the outcome.
-                _ if attribute.is_true() => {}
+                _ if attribute.comes_with_truth() => {}
                 Storage::Length(single, exact) => {
                     single.of_mut(cloud).push(value as f32);
                     if self.digits != Digits::Single || attribute == Attribute::Range {
@@ -498,7 +498,8 @@ impl Gathered {
                 let outcome = at.map_or(Outcome::Empty, |at| returns.outcome[at]);
                 pixels.push(Surface { outcome, ..Surface::NONE });
             }
-            cloud.truth = Truth { returns, pixels };
+            let radial_velocity = std::mem::take(&mut cloud.truth.radial_velocity);
+            cloud.truth = Truth { returns, pixels, radial_velocity };
         }
         Ok(self.finished(about))
     }

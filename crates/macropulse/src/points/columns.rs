@@ -85,6 +85,8 @@ attributes! {
     /// as many, 4 for one whose intensity is a lower bound: no mark was missed, and no amplitude is
     /// measured.
     Flags = measured("flags", "", Bit(field!(false, saturated)));
+    /// Radial velocity, m/s, positive of a surface that approaches; of sensors that measure it.
+    RadialVelocity = measured("radial_velocity", "m/s", Real(field!(f32::NAN, radial_velocity)));
     /// Energy as the receiver can tell it, in detected photons per mark; files do not have it.
     Photons = measured("photons", "", Real(field!(f32::NAN, photons)));
     /// Truth: range of the surface that the return came from, or else of the first one along the
@@ -103,6 +105,10 @@ attributes! {
     /// Truth: angle of incidence, rad; NaN where there is no surface.
     Incidence = truth(
         "incidence", "rad", Cosine(field!(f32::NAN, truth.returns.cosine, truth.pixels.cosine)),
+    );
+    /// Truth: radial velocity of the surface, m/s, positive where it approaches; of sensors that measure it.
+    TrueRadialVelocity = truth(
+        "true_radial_velocity", "m/s", Real(field!(f32::NAN, truth.radial_velocity)),
     );
     /// Truth: how the return came out, an index into `OUTCOMES`: 1 right, 2 near, 3 wrong, 5
     /// false, 6 edge.
@@ -346,6 +352,11 @@ impl Attribute {
         self.entry().is_true
     }
 
+    /// Whether every cloud with a truth has it: all that is true, but what only some sensors measure.
+    pub(crate) fn comes_with_truth(self) -> bool {
+        self.is_true() && self != Self::TrueRadialVelocity
+    }
+
     /// Whether its values are computed from columns when they are asked for.
     pub fn is_computed(self) -> bool {
         matches!(self.storage(), Bit(_) | Cosine(_) | Code(_))
@@ -370,7 +381,7 @@ impl Attribute {
             // A row without a column is the ring of a driver.
             Self::Row => has(self) && has(Self::Column),
             Self::Flags => has(self) || has(Self::Marks),
-            _ if self.is_true() => cloud.has_truth(),
+            _ if self.comes_with_truth() => cloud.has_truth(),
             _ => has(self),
         }
     }
@@ -436,7 +447,7 @@ impl Attribute {
             Self::X | Self::Y | Self::Z => {
                 [Some(Group::Coordinates), Some(Group::ExactCoordinates)]
             }
-            _ if self.is_true() => [Some(Group::Truth), None],
+            _ if self.comes_with_truth() => [Some(Group::Truth), None],
             _ => [None; 2],
         };
         let fields = self.storage().fields().zip(groups);

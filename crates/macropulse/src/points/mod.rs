@@ -120,6 +120,8 @@ pub struct PointCloud {
     pub marks: Vec<u16>,
     /// Peak minus the best other lag.
     pub margin: Vec<u16>,
+    /// Radial velocity, m/s, positive towards the sensor; empty of a sensor that measures none.
+    pub radial_velocity: Vec<f32>,
     /// Energy as the receiver can tell it, in detected photons per mark. Not written to files, so
     /// absent in a cloud read from one.
     pub photons: Vec<f32>,
@@ -170,6 +172,9 @@ pub struct Truth {
     /// How every pixel came out, by the return that its image shows; and of those without a return the
     /// first surface along the beam within the range gate.
     pub pixels: Surfaces,
+    /// Of every return, the radial velocity of the surface beside it, m/s, positive towards the sensor; NaN where there is
+    /// none. Empty of a sensor whose light does not show it.
+    pub radial_velocity: Vec<f32>,
 }
 
 /// Surfaces that were seen or could have been, as columns.

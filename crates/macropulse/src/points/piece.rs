@@ -63,6 +63,7 @@ impl Piece {
         points.margin.extend(&returns.margin);
         points.photons.extend(returns.photons.iter().map(|&photons| scale.detected(photons)));
         points.saturated.extend(&returns.saturated);
+        points.radial_velocity.extend(&returns.radial_velocity);
         // The last number among those of a shot is how many they are.
         points.number_of_returns.extend(&returns.number);
         if returns.number.iter().any(|number| *number > 1) {

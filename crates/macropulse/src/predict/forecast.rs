@@ -13,7 +13,7 @@ use super::best_lag::{BestLag, Sight};
 use super::converters::bank_loss;
 use super::own_light::{OwnLight, stray_room};
 use super::sidelobes::{Aside, Sidelobes};
-use super::{balanced, belief, histogram, matched, phase, sampled};
+use super::{balanced, beat, belief, histogram, matched, phase, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
 use crate::design::{Design, Detector, Wave};
@@ -62,6 +62,8 @@ pub struct Forecaster<'a> {
     counting: Option<histogram::Counting>,
     /// Of a receiver of taps.
     phases: Option<phase::Phases>,
+    /// Of a receiver of beats.
+    beats: Option<Arc<beat::Beats>>,
     /// Factor on the light of the sensor.
     light: f64,
     /// Factor on the dark and background counts.
@@ -144,6 +146,10 @@ impl<'a> Forecaster<'a> {
             Method::Phase(method) => phase::Phases::of(design, method),
             _ => None,
         };
+        let beats = match &design.receiver.method {
+            Method::Beat(method) => beat::Beats::of(design, method).map(Arc::new),
+            _ => None,
+        };
         Ok(Self {
             design,
             operating,
@@ -155,6 +161,7 @@ impl<'a> Forecaster<'a> {
             points: points.into(),
             counting,
             phases,
+            beats,
             light,
             background,
         })
@@ -254,12 +261,28 @@ impl<'a> Forecaster<'a> {
         if let Some(counting) = &self.counting {
             return self.of_histograms(counting, reflectance, range);
         }
+        let detected = self.light * operating.link.detected(reflectance, range);
         if let Some(phases) = &self.phases {
-            return self.of_taps(phases, reflectance, range);
+            let falling = self.background * operating.false_rate;
+            let chances = phases.chances(range, detected, falling);
+            return self.without_pulses(
+                (reflectance, range),
+                detected,
+                phases.false_alarm(),
+                &chances,
+            );
+        }
+        if let Some(beats) = &self.beats {
+            let chances = beats.chances(range, detected, self.background * operating.background);
+            return self.without_pulses(
+                (reflectance, range),
+                detected,
+                beats.false_alarm(),
+                &chances,
+            );
         }
         let detector = design.detector.model();
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
-        let detected = self.light * operating.link.detected(reflectance, range);
         let false_rate = self.background * operating.false_rate;
         let photon_rate = self.falling_of(detected) * mean_weight / channel_period;
         let falling = false_rate + photon_rate;
@@ -434,12 +457,15 @@ impl<'a> Forecaster<'a> {
         }
     }
 
-    /// What a receiver of taps will measure of a target of `reflectance` at `range` metres. `background` counts for
-    /// sunlight and dark current.
-    fn of_taps(&self, phases: &phase::Phases, reflectance: f64, range: f64) -> Forecast {
-        let detected = self.light * self.operating.link.detected(reflectance, range);
-        let falling = self.background * self.operating.false_rate;
-        let chances = phases.chances(range, detected, falling);
+    /// What is measured of a target, its reflectance and range, m, where so many photons of a shot without pulses are
+    /// `detected`, which has these `chances`.
+    fn without_pulses(
+        &self,
+        (reflectance, range): (f64, f64),
+        detected: f64,
+        false_per_shot: f64,
+        chances: &phase::Chances,
+    ) -> Forecast {
         Forecast {
             range,
             reflectance,
@@ -450,7 +476,7 @@ impl<'a> Forecaster<'a> {
             density: 0.0,
             snr: chances.snr,
             pd: chances.pd,
-            false_per_shot: phases.false_alarm(),
+            false_per_shot,
             precision: (chances.pd * FEWEST >= 1.0).then_some(chances.precision),
             aside: None,
             bound: chances.bound,
@@ -542,6 +568,10 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, Strin
             let remedy = "simulate it, or leave out correct_harmonics";
             ("harmonics that are not corrected".to_owned(), remedy.to_owned())
         });
+    }
+    if let (Method::Beat(_), Some(chirp)) = (method, design.emission.chirp()) {
+        let what = "a frequency that strays from its ramps".to_owned();
+        return (chirp.error.amplitude > 0.0).then(|| (what, "simulate it".to_owned()));
     }
     if !matches!(method, Method::Direct | Method::Sampled(_)) && method.correlation().is_none() {
         let what = format!("the receiver `{}`", method.kind().name());

@@ -2,6 +2,7 @@
 
 pub mod comparison;
 mod balanced;
+mod beat;
 mod belief;
 mod best_lag;
 pub mod converters;

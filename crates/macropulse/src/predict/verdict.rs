@@ -123,6 +123,9 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
         None if night.design().emission.modulation().is_some() => {
             "no amount of light would do: the taps are full, or several intervals have the same phases".to_owned()
         }
+        None if night.design().emission.chirp().is_some() => {
+            "no amount of light would do: it is out of step with that of the laser".to_owned()
+        }
         None => "no amount of light would do: the receiver finds too many marks lit".to_owned(),
     };
     let light = match found.photons_per_shot.is_finite() {
@@ -208,6 +211,9 @@ fn converters(design: &Design, forecast: &Forecast) -> Check {
         None if design.emission.modulation().is_some() => {
             "every pixel has taps of its own, which are never busy".to_owned()
         }
+        None if design.emission.chirp().is_some() => {
+            "every detector has spectra of its own, which are never busy".to_owned()
+        }
         None => "every detector has an ADC of its own, which is never busy".to_owned(),
         Some(bank) => format!(
             "{:.2} % of detection events find all {} of a detector's bank busy",
@@ -224,9 +230,9 @@ fn converters(design: &Design, forecast: &Forecast) -> Check {
 }
 
 /// Whether chips, or marks behind the detector, are told apart on a surface at `range` metres that is slanted by
-/// 45°; `None` of a beam that is a line, and of modulated light.
+/// 45°; `None` of a beam that is a line, and of light without pulses.
 pub fn slant(design: &Design, range: f64) -> Option<Check> {
-    if design.light.divergence == 0.0 || design.emission.modulation().is_some() {
+    if design.light.divergence == 0.0 || !design.emission.is_pulsed() {
         return None;
     }
     let spot = libm::hypot(design.light.beam_diameter, design.light.divergence * range);

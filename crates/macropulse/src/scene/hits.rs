@@ -45,6 +45,8 @@ pub struct Hits {
     pub material: Vec<u16>,
     /// Index into `Scene::objects`.
     pub object: Vec<u16>,
+    /// How fast the surface approaches, m/s; empty for a sensor whose light does not show it.
+    pub radial_velocity: Vec<f32>,
 }
 
 impl Hits {
@@ -66,6 +68,7 @@ impl Hits {
             cosine: ordered(&self.cosine, &order),
             material: ordered(&self.material, &order),
             object: ordered(&self.object, &order),
+            radial_velocity: Vec::new(),
         }
     }
 }
@@ -91,6 +94,7 @@ mod tests {
             object: column(|i| 9 - i as u16),
             shot,
             range,
+            ..Hits::default()
         };
         let by_shot = hits.by_shot(5);
         assert_eq!(by_shot.shot, [0, 0, 0, 2, 2, 3]);

@@ -1,5 +1,6 @@
 //! What the beam meets: meshes, materials, transforms, ray casting.
 
+mod approach;
 mod assemble;
 mod batch;
 mod builtin;

@@ -62,6 +62,15 @@ impl Mover {
         }
     }
 
+    /// The object that it is of, and how it moves.
+    pub(super) fn moves(&self) -> (u16, &Motion) {
+        let object = match &self.body {
+            Body::Shape(solid) => solid.object(),
+            Body::Mesh { object, .. } => *object,
+        };
+        (object, &self.motion)
+    }
+
     /// Number of triangles that can be hit.
     pub(super) fn triangles(&self) -> usize {
         match &self.body {

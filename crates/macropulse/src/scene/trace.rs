@@ -22,7 +22,10 @@ impl Scene {
     pub fn trace(&self, design: &Design, log: &ShotLog) -> Traced {
         let directions = design.directions();
         let along = |shot: usize| directions.of_shot(log, shot);
-        let middle = self.trace_along(design, log, along);
+        let mut middle = self.trace_along(design, log, along);
+        if design.emission.chirp().is_some() {
+            middle.radial_velocity = self.radial_velocities(design, log, &middle);
+        }
         if !design.scan.moves {
             return Traced { middle, sub_macropulses: Vec::new() };
         }

@@ -14,6 +14,7 @@ use glam::{DVec3, Vec3A};
 
 use super::closed_form::Solid;
 use super::hits::{CastRays, Hit, Ray};
+use super::motion::Motion;
 use super::moving::Mover;
 use super::pose::Transform;
 use super::raycast::{Facets, Loose};
@@ -94,6 +95,18 @@ impl World {
         let facets = Facets::new(facets, centre);
         let movers = Vec::new();
         Self { facets, models, primitives, unbounded: first, tree, leaves, movers }
+    }
+
+    /// How each of this number of objects moves; `None` of those that stand still.
+    pub(super) fn motions(&self, objects: usize) -> Vec<Option<&Motion>> {
+        let mut motions = vec![None; objects];
+        for mover in &self.movers {
+            let (object, motion) = mover.moves();
+            if let Some(place) = motions.get_mut(usize::from(object)) {
+                *place = Some(motion);
+            }
+        }
+        motions
     }
 
     /// The same world with `movers` in it.

@@ -59,6 +59,7 @@ mod tests {
             cosine: vec![0.5],
             material: vec![3],
             object: vec![7],
+            ..Hits::default()
         }
     }
 

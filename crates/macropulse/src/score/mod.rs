@@ -100,6 +100,8 @@ pub fn judge(
     };
     piece.points.truth.pixels.blank(log.owned.len());
     piece.points.truth.returns.blank(piece.shot.len());
+    let approaches = |i: Option<usize>| i.and_then(|i| hits.radial_velocity.get(i)).copied();
+    let mut velocities = std::mem::take(&mut piece.points.truth.radial_velocity);
     for shot in log.owned.clone() {
         let first = next;
         while next < hits.shot.len() && hits.shot[next] as usize == shot {
@@ -127,6 +129,7 @@ pub fn judge(
             let is_on_target = on_target(first);
             let answered = matches!(judged.outcome, Outcome::Right | Outcome::Near);
             piece.points.truth.returns.set(at, judged);
+            velocities.extend(approaches(Some(first)));
             piece.points.truth.pixels.outcome[pixel] = judged.outcome;
             score.samples_on_target += u64::from(is_on_target);
             score.points_on_target += u64::from(is_on_target && answered);
@@ -147,6 +150,9 @@ pub fn judge(
             let judged = edge(surface(source, outcome), traced, shot, (&gate, measured));
             let outcome = judged.outcome;
             piece.points.truth.returns.set(at, judged);
+            if design.emission.chirp().is_some() {
+                velocities.push(approaches(source).unwrap_or(f32::NAN));
+            }
             let points = &piece.points;
             let is_further = points.return_number[at] > 1;
             score.further[outcome as usize] += u64::from(is_further);
@@ -176,5 +182,6 @@ pub fn judge(
         score.dark += u64::from(outcome == Outcome::Missed && is_dark());
         score.pixels[outcome as usize] += 1;
     }
+    piece.points.truth.radial_velocity = velocities;
     score
 }

@@ -55,6 +55,10 @@ pub(super) fn recorded(
         tally.taps = taps.codes.len() as u64;
         return Recorded { given: stages.done(DETECT, Given::Taps(taps)), tally };
     }
+    if let Some(beats) = detectors.beats(log, light) {
+        tally.peaks = beats.found.iter().filter(|peak| peak.power > 0).count() as u64;
+        return Recorded { given: stages.done(DETECT, Given::Beats(beats)), tally };
+    }
     let span = band.ticks(design).0;
     if let Some(samples) = detectors.samples(log, light, &span) {
         tally.samples = samples.code.len() as u64;

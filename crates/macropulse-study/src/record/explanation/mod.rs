@@ -2,6 +2,7 @@
 //!
 //! A kind of record is a variant of [`Record`] with a file of its own.
 
+mod beats;
 mod curve;
 mod histograms;
 mod light;
@@ -22,6 +23,7 @@ use macropulse::units::{range_from_tof, s_from_fs};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use self::beats::Spectra;
 use self::curve::Scale;
 use self::histograms::Counts;
 use self::light::Light;
@@ -84,6 +86,7 @@ enum Record {
     Samples(Samples),
     Histograms(Counts),
     Taps(Phasors),
+    Beats(Spectra),
 }
 
 impl Record {
@@ -94,6 +97,7 @@ impl Record {
             Self::Samples(samples) => samples.push(columns),
             Self::Histograms(counts) => counts.push(columns),
             Self::Taps(phasors) => phasors.push(columns),
+            Self::Beats(spectra) => spectra.push(columns),
         }
     }
 
@@ -104,6 +108,7 @@ impl Record {
             Self::Samples(samples) => samples.whole.as_ref().map(|whole| &whole.correlation.scale),
             Self::Histograms(counts) => Some(&counts.scale),
             Self::Taps(phasors) => Some(&phasors.scale),
+            Self::Beats(spectra) => Some(&spectra.scale),
         }
     }
 
@@ -113,7 +118,7 @@ impl Record {
             Self::Ticks(ticks) => ticks.whole = None,
             Self::Samples(samples) => samples.whole = None,
             Self::Histograms(counts) => counts.counts = None,
-            Self::Taps(_) => {}
+            Self::Taps(_) | Self::Beats(_) => {}
         }
     }
 }
@@ -197,6 +202,7 @@ impl PixelExplanation {
             Given::Samples(samples) => samples::decision(design, (log, samples), shot)?,
             Given::Histograms(counts) => histograms::decision(design, (log, counts), shot)?,
             Given::Taps(taps) => taps::decision(design, (log, taps), shot)?,
+            Given::Beats(beats) => beats::decision(design, (log, beats), shot)?,
         };
         let lasts = marks.last().map_or(0, |last| last + width);
         let light = arrivals(&Stretch {
@@ -261,6 +267,7 @@ impl PixelExplanation {
             Record::Samples(_) => ("samples", false),
             Record::Histograms(_) => ("histograms", false),
             Record::Taps(_) => ("taps", false),
+            Record::Beats(_) => ("beats", false),
         };
         columns.push(
             "light",
@@ -296,6 +303,7 @@ impl PixelExplanation {
             Record::Samples(samples) => samples.charts(),
             Record::Histograms(counts) => counts.charts(&self.returns),
             Record::Taps(phasors) => phasors.charts(&self.returns),
+            Record::Beats(spectra) => spectra.charts(),
         }
     }
 

@@ -43,6 +43,7 @@ function colourings(cloud, outcomes) {
     ["intensity", "Intensity", ""],
     ["row", "Ring (row)", ""],
     ["z", "Height z", "m"],
+    ["radial_velocity", "Radial velocity", "m/s"],
   ].map(([column, title, unit]) => ({ column, title, unit }));
   const numbers = APART.map((colour, at) => ({ code: at + 1, name: String(at + 1), colour }));
   const classes = [

@@ -6,12 +6,12 @@ use std::sync::OnceLock;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Budget, CoScanned, Eye, Field, solid_angle};
+use super::{Budget, CoScanned, Eye, Field, mode, solid_angle};
 use crate::design::detector::Efficiency;
 use crate::design::light::EnergyFile;
 use crate::design::limits::Check;
 use crate::design::safety::{Limit, strictest};
-use crate::design::{Effect, Emission, Error, Light, Scan};
+use crate::design::{Effect, Emission, Error, Light, Readout, Scan};
 use crate::units::tof_from_range;
 
 /// `[optics]` as typed.
@@ -24,11 +24,11 @@ pub(in crate::design) struct OpticsFile {
     /// Transmission of the optics, both ways together.
     #[schemars(range(min = 1e-6, max = 1))]
     transmission: f64,
-    /// Width of the optical filter, nm.
+    /// Width of the optical filter, nm; left out with a [chirp], whose laser selects the light.
     #[schemars(range(min = 0.001, max = 1000))]
-    filter_nm: f64,
-    /// What a detector looks at.
-    field: FieldFile,
+    filter_nm: Option<f64>,
+    /// What a detector looks at; left out with a [chirp].
+    field: Option<FieldFile>,
 }
 
 /// What a detector looks at, as typed.
@@ -76,6 +76,7 @@ pub(in crate::design) struct Parts<'a> {
     pub scan: &'a Scan,
     pub light: &'a Light,
     pub emission: &'a Emission,
+    pub readout: &'a Readout,
     pub idealised: &'a [Effect],
 }
 
@@ -118,15 +119,20 @@ impl Check<'_> {
             limits.get_or_init(|| eye.limits(scan, light, emission)).as_slice()
         };
         let energy = self.energy(file.energy, allowed, off(Effect::EyeSafety))?;
+        let aperture = self.within("optics.aperture_mm", optics.aperture_mm, 0.01, 1e4)? * 1e-3;
+        let (filter, field) = match parts.readout {
+            Readout::Spectrum(spectrum) => mode(wavelength, aperture, spectrum.sample_hz),
+            _ => (self.filter(optics)?, self.field(optics, parts.scan)?),
+        };
         Ok(Some(Budget {
             wavelength,
             energy,
             eye,
             limits,
-            aperture: self.within("optics.aperture_mm", optics.aperture_mm, 0.01, 1e4)? * 1e-3,
+            aperture,
             transmission: self.within("optics.transmission", optics.transmission, 1e-6, 1.0)?,
-            filter: self.within("optics.filter_nm", optics.filter_nm, 1e-3, 1e3)? * 1e-9,
-            field: self.field(optics, parts.scan)?,
+            filter,
+            field,
             efficiency: self.within(path, efficiency, 1e-6, 1.0)?,
         }))
     }
@@ -177,9 +183,21 @@ impl Check<'_> {
         self.refuse(path, message)
     }
 
+    /// Width of the optical filter, m.
+    fn filter(&self, optics: &OpticsFile) -> Result<f64, Error> {
+        let path = "optics.filter_nm";
+        let Some(typed) = optics.filter_nm else {
+            return Err(self.chain.lacks(path, "missing field `filter_nm`"));
+        };
+        Ok(self.within(path, typed, 1e-3, 1e3)? * 1e-9)
+    }
+
     /// What each detector looks at: of a raster as the file says, of several detectors the cell of
     /// its pixel or a cone about it.
     fn field(&self, optics: &OpticsFile, scan: &Scan) -> Result<Field, Error> {
+        let Some(typed) = optics.field else {
+            return Err(self.chain.lacks("optics.field", "missing field `field`"));
+        };
         let (rows, columns) = (f64::from(scan.rows), f64::from(scan.columns));
         let [across, down] = scan.model().cell();
         let pixel = solid_angle(across, down);
@@ -189,13 +207,13 @@ impl Check<'_> {
             solid_angle,
             co_scanned: follows.then_some(CoScanned { pixels, pixel_period }),
         };
-        if let FieldFile::ConeMrad(angle) = optics.field {
+        if let FieldFile::ConeMrad(angle) = typed {
             let angle = self.within("optics.field.cone_mrad", angle, 1e-3, 1e3)? * 1e-3;
             return Ok(co_scanned(cone_pixels(angle / across), FRAC_PI_4 * angle * angle));
         }
         if let Some([horizontal, vertical]) = scan.model().shared_field() {
             let strip = |pixels: f64| co_scanned(pixels, pixels * pixel);
-            return Ok(match optics.field {
+            return Ok(match typed {
                 FieldFile::Staring => {
                     Field { solid_angle: solid_angle(horizontal, vertical), co_scanned: None }
                 }
@@ -209,7 +227,7 @@ impl Check<'_> {
                 FieldFile::Descanned | FieldFile::ConeMrad(_) => strip(1.0),
             });
         }
-        match optics.field {
+        match typed {
             FieldFile::Descanned => Ok(co_scanned(1.0, pixel)),
             _ => self.refuse(
                 "optics.field",

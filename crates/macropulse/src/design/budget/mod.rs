@@ -2,7 +2,7 @@
 
 mod check;
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_4, PI};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 pub(in crate::design) use check::{BudgetFile, OpticsFile, Parts, SafetyFile};
@@ -101,6 +101,14 @@ impl Budget {
             * self.transmission;
         power / self.photon_energy()
     }
+}
+
+/// Filter, m, and field of a coherent receiver: light within its bandwidth, in one mode of an aperture of this diameter.
+/// Of light that is not polarised the mode has half, which the field is made smaller by.
+fn mode(wavelength: f64, aperture: f64, sample_hz: f64) -> (f64, Field) {
+    let filter = wavelength * wavelength * sample_hz / SPEED_OF_LIGHT;
+    let solid_angle = wavelength * wavelength / (FRAC_PI_4 * aperture * aperture) / 2.0;
+    (filter, Field { solid_angle, co_scanned: None })
 }
 
 /// Class 1 limits of the sensors that were opened last, the newest at the end.

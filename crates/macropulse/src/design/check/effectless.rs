@@ -100,6 +100,16 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
         let wiggle = ["receiver.correct_harmonics"];
         add(modulation.is_sine(), &wiggle, "modulation.wave", "a sine has no harmonics");
     }
+    if let Some(chirp) = &file.chirp {
+        let no_pulse = ["tdc", "light.pulse_ps", "light.linewidth_ghz"];
+        let why = "light with a chirp has no pulses, and its line is that of chirp.linewidth_khz";
+        add(true, &no_pulse, "chirp", why);
+        let of_mode = ["optics.filter_nm", "optics.field"];
+        add(true, &of_mode, "chirp", "light of the mode of the laser alone makes a beat");
+        let speed = ["receiver.max_speed_m_s"];
+        add(chirp.is_single(), &speed, "chirp.down_us", "a single ramp measures no speed");
+    }
+    add(file.chirp.is_none(), &["spectrum"], "chirp", "there are no beats without a [chirp]");
     let unlabelled = file.code.as_ref().is_some_and(|code| code.label == Label::None);
     let payload = ["code.label_bits", "code.crc", "code.sync_bit", "code.allow_dark"];
     add(unlabelled, &payload, "code.label", "a macropulse without a label is a bare code word");

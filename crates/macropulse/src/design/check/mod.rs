@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::budget::{self, BudgetFile, OpticsFile, SafetyFile};
+use super::chirp::ChirpFile;
 use super::coding::CodeFile;
 use super::detector::{Before, ComparatorFile, DetectorFile, Efficiency};
 use super::document::Chain;
@@ -15,7 +16,7 @@ use super::emission::BurstFile;
 use super::light::LightFile;
 use super::limits::Check;
 use super::modulation::ModulationFile;
-use super::readout::{AdcFile, HistogramFile, TdcFile};
+use super::readout::{AdcFile, HistogramFile, SpectrumFile, TdcFile};
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
 use super::{Clock, Coding, Design, Detector, Effect, Emission, Error, Light, Readout, Scan};
@@ -48,7 +49,9 @@ pub(in crate::design) struct SensorFile {
     pub burst: Option<BurstFile>,
     /// Modulation of the light of a shot without pulses; leave the table out for pulses.
     pub modulation: Option<ModulationFile>,
-    /// From light to detection events, to a signal or to taps: one kind of detector.
+    /// Ramps of the frequency of the light of a shot without pulses; leave the table out for pulses.
+    pub chirp: Option<ChirpFile>,
+    /// From light to detection events, to a signal, to taps or to beats: one kind of detector.
     pub detector: DetectorFile,
     /// From the signal of a photodiode to detection events.
     pub comparator: Option<ComparatorFile>,
@@ -62,7 +65,9 @@ pub(in crate::design) struct SensorFile {
     pub adc: Option<AdcFile>,
     /// From counts to histograms; leave the table out where detection events are timed or sampled.
     pub histogram: Option<HistogramFile>,
-    /// From ticks, samples, histograms or taps to returns.
+    /// From beats to the peaks of their spectra; with a chirp.
+    pub spectrum: Option<SpectrumFile>,
+    /// From ticks, samples, histograms, taps or beats to returns.
     pub receiver: ReceiverFile,
 }
 
@@ -70,6 +75,11 @@ impl SensorFile {
     /// Whether its detector puts out a signal, for a comparator or an ADC.
     fn has_signal(&self) -> bool {
         self.detector.only().is_some_and(|only| only.file.has_signal())
+    }
+
+    /// Whether its light comes in pulses.
+    fn is_pulsed(&self) -> bool {
+        self.modulation.is_none() && self.chirp.is_none()
     }
 
     /// The ADC, where there is a signal for it.
@@ -144,6 +154,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     let adc = file.adc();
     let timing = faults.keep(match (&file.histogram, adc) {
         _ if file.modulation.is_some() => Ok(check.of_taps()),
+        _ if file.chirp.is_some() => check.chirped_readout(file),
         (Some(histogram), _) => check.histogram(histogram),
         (None, Some(adc)) => check.adc(adc),
         (None, None) => check.tdc(&file.tdc),
@@ -163,7 +174,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     let light = effects.as_ref().and_then(|effects| {
         faults.0.extend(check.without_effect(file, effects));
         faults.0.extend(check.not_followed(&file.detector, effects));
-        faults.keep(check.light(&file.light, file.modulation.is_some(), off))
+        faults.keep(check.light(&file.light, file.is_pulsed(), off))
     });
     let right_within = match file.receiver.right_within_m {
         Some(typed) => {
@@ -173,8 +184,13 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     };
     let (idealised, scan, (clock, readout)) = (effects?, scan?, timing?);
     let (emission, light) = (emission?, light?);
-    let before =
-        budget::Parts { scan: &scan, light: &light, emission: &emission, idealised: &idealised };
+    let before = budget::Parts {
+        scan: &scan,
+        light: &light,
+        emission: &emission,
+        readout: &readout,
+        idealised: &idealised,
+    };
     let efficiency = Efficiency::of(&file.detector);
     let of_budget = BudgetFile {
         optics: file.optics.as_ref(),
@@ -214,6 +230,10 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
         }),
         lock_in: detector.as_ref().and_then(|detector| match detector {
             Detector::LockIn(lock_in) => Some(lock_in),
+            _ => None,
+        }),
+        coherent: detector.as_ref().and_then(|detector| match detector {
+            Detector::Coherent(coherent) => Some(coherent),
             _ => None,
         }),
         pulse: libm::hypot(jitter, light.pulse * RMS_OF_FWHM),
@@ -331,8 +351,8 @@ impl Check<'_> {
     /// What a shot sends.
     fn emission(&self, file: &SensorFile, scan: &Scan, clock: Clock) -> Result<Emission, Error> {
         let coding = self.coding(file.code.as_ref(), scan, clock)?;
-        if let Some(modulation) = &file.modulation {
-            return self.modulated(file, modulation, coding, scan);
+        if !file.is_pulsed() {
+            return self.without_pulses(file, coding, scan);
         }
         let Some(burst) = &file.burst else { return Ok(Emission::Marks(coding)) };
         if file.code.is_some() {
@@ -341,30 +361,55 @@ impl Check<'_> {
         Ok(Emission::Burst(self.burst(burst, coding, clock)?))
     }
 
-    /// The same where its light has a `modulation`, which goes with no pulses and with a pixel that follows it.
-    fn modulated(
+    /// The same where its light is modulated, in power or in frequency, which goes with no pulses and with a detector that
+    /// follows it.
+    fn without_pulses(
         &self,
         file: &SensorFile,
-        modulation: &ModulationFile,
         shot: Coding,
         scan: &Scan,
     ) -> Result<Emission, Error> {
+        let (table, detector) = match file.modulation {
+            Some(_) => ("modulation", "lock-in"),
+            None => ("chirp", "coherent"),
+        };
         for (key, is_there) in [
             ("code", file.code.is_some()),
             ("burst", file.burst.is_some()),
             ("histogram", file.histogram.is_some()),
+            ("chirp", file.modulation.is_some() && file.chirp.is_some()),
         ] {
             if is_there {
-                let message =
-                    "is of pulses, and the light of a [modulation] has none: leave one of them out";
+                let of = if key == "chirp" { "a frequency" } else { "pulses" };
+                let message = format!(
+                    "is of {of}, and the light of a [{table}] has none: leave one of them out"
+                );
                 return self.refuse(key, message);
             }
         }
-        if file.detector.only().is_none_or(|only| only.name != "lock-in") {
-            return self.refuse("detector", "must be `lock-in` where light has a [modulation]");
+        if file.detector.only().is_none_or(|only| only.name != detector) {
+            let message = format!("must be `{detector}` where light has a [{table}]");
+            return self.refuse("detector", message);
         }
-        let modulation = self.modulation(modulation, shot, scan.light_range)?;
-        Ok(Emission::Modulated(modulation))
+        match (&file.modulation, &file.chirp) {
+            (Some(modulation), _) => {
+                Ok(Emission::Modulated(self.modulation(modulation, shot, scan.light_range)?))
+            }
+            (None, Some(chirp)) => {
+                Ok(Emission::Chirped(self.chirp(chirp, shot, scan.light_range)?))
+            }
+            (None, None) => Ok(Emission::Marks(shot)),
+        }
+    }
+
+    /// Clock and readout of light with a chirp.
+    fn chirped_readout(&self, file: &SensorFile) -> Result<(Clock, Readout), Error> {
+        match &file.spectrum {
+            Some(spectrum) => self.spectrum(spectrum),
+            None => {
+                Err(self.chain.lacks("spectrum", "records the beats of a [chirp], and is missing"))
+            }
+        }
     }
 
     /// Whether bursts and histograms go together: who repeats pulses adds up their counts, in bins that lie within
@@ -412,7 +457,7 @@ impl Check<'_> {
         if matches!(emission, Emission::Marks(_)) || !moves || scan.is_one_flash() {
             return Ok(());
         }
-        let message = "the beam is not followed while it sends a [burst] or a [modulation]: put \"mirror-motion\" on this \
+        let message = "the beam is not followed while it sends a [burst], a [modulation] or a [chirp]: put \"mirror-motion\" on this \
                        list, or --without mirror-motion";
         self.refuse("idealised", message)
     }
@@ -490,17 +535,18 @@ impl Check<'_> {
                 return self.refuse("burst", message);
             }
         }
-        if let Some(modulation) = design.emission.modulation() {
-            let lasts = s_from_fs(modulation.length_fs());
-            if lasts > derived.channel_period {
-                let message = format!(
-                    "lasts {:.3} µs, longer than the {:.3} µs between two shots of a detector: fewer taps, \
-                     shorter exposures, or a slower scan",
-                    lasts * 1e6,
-                    derived.channel_period * 1e6
-                );
-                return self.refuse("modulation", message);
-            }
+        let (table, remedy) = match design.emission {
+            Emission::Modulated(_) => ("modulation", "fewer taps, shorter exposures"),
+            _ => ("chirp", "shorter ramps, a shorter light_range_m"),
+        };
+        let lasts = s_from_fs(design.emission.length_fs());
+        if !design.emission.is_pulsed() && lasts > derived.channel_period {
+            let message = format!(
+                "lasts {:.3} µs, longer than the {:.3} µs between two shots of a detector: {remedy}, or a slower scan",
+                lasts * 1e6,
+                derived.channel_period * 1e6
+            );
+            return self.refuse(table, message);
         }
         if design.is_coded() && derived.macropulse > derived.channel_period {
             let of = match design.channels() {

@@ -6,8 +6,8 @@ use serde::Deserialize;
 
 use super::table::MOST_COUNTS;
 use super::{
-    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Noise, Sensitivity, SensitivityFile,
-    Table, Typed, length_followed,
+    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Sensitivity, SensitivityFile, Table,
+    Typed, length_followed,
 };
 use crate::design::{Error, Light};
 use crate::units::{fs_from_s, s_from_fs};
@@ -201,10 +201,6 @@ impl Model for Geiger {
         libm::hypot(self.jitter, length_followed(light))
     }
 
-    fn response(&self) -> f64 {
-        0.0
-    }
-
     fn memory_fs(&self) -> i64 {
         DEAD_TIMES * self.dead_fs
     }
@@ -223,10 +219,6 @@ impl Model for Geiger {
 
     fn false_rate(&self, background: f64) -> f64 {
         self.dark + background
-    }
-
-    fn noise(&self, _: f64) -> Option<Noise> {
-        None
     }
 
     /// An armed cell fires if one photon of those that fall on it is detected.

@@ -4,8 +4,7 @@ use macropulse_codec::statistics::{normal_tail, poisson};
 
 use super::comparator::{bump, threshold_over_noise};
 use super::{
-    Awaited, Comparator, FirstEvent, FrontEnd, LinearSetting, Lit, Model, Noise, SLICES,
-    Sensitivity, slices_above,
+    Comparator, FrontEnd, LinearSetting, Lit, Model, Noise, SLICES, Sensitivity, slices_above,
 };
 use crate::design::Light;
 
@@ -116,10 +115,6 @@ impl Model for Linear {
         self.sensitivity
     }
 
-    fn declared_background(&self) -> f64 {
-        0.0
-    }
-
     /// Of a mark that only just crosses the threshold: noise over the slope, τ·noise/threshold, with
     /// the jitter of the input. It does not depend on how large the noise is.
     fn jitter(&self) -> f64 {
@@ -136,14 +131,6 @@ impl Model for Linear {
 
     fn response(&self) -> f64 {
         self.front_end.response()
-    }
-
-    fn memory_fs(&self) -> i64 {
-        0
-    }
-
-    fn refusal(&self, _: f64) -> Option<String> {
-        None
     }
 
     /// The threshold follows the noise, so that this crosses it as often in any light.
@@ -165,18 +152,6 @@ impl Model for Linear {
     }
 
     /// What light the pulse has is followed as a whole: its length is that of the pulse.
-    fn mark_displacement(&self, _: &Lit, _: &Light) -> f64 {
-        0.0
-    }
-
-    fn ready_share(&self, _: f64) -> f64 {
-        1.0
-    }
-
-    fn first_event(&self, awaited: &Awaited) -> FirstEvent {
-        FirstEvent::without_memory(awaited)
-    }
-
     fn summary(&self) -> String {
         format!(
             "comparator; threshold {:.2} times the noise; {}; {:.0e} false alarms/s",

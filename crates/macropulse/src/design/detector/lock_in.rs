@@ -8,9 +8,7 @@ use macropulse_codec::decode::phase::Tone;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{
-    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Noise, Sensitivity, Table, Typed,
-};
+use super::{Detector, Follows, Idle, Lit, Model, Sensitivity, Table, Typed};
 use crate::design::{Emission, Error, Light, Modulation};
 
 /// Share of the codes that are below that of a tap which has collected nothing, so that noise is not cut off.
@@ -163,36 +161,12 @@ impl Model for LockIn {
         self.sensitivity
     }
 
-    fn declared_background(&self) -> f64 {
-        0.0
-    }
-
-    fn jitter(&self) -> f64 {
-        0.0
-    }
-
     fn resolution(&self, _: &Light) -> f64 {
         self.just_found()
     }
 
-    fn response(&self) -> f64 {
-        0.0
-    }
-
-    fn memory_fs(&self) -> i64 {
-        0
-    }
-
-    fn refusal(&self, _: f64) -> Option<String> {
-        None
-    }
-
     fn false_rate(&self, background: f64) -> f64 {
         self.dark + background
-    }
-
-    fn noise(&self, _: f64) -> Option<Noise> {
-        None
     }
 
     fn mark_pd(&self, lit: &Lit) -> f64 {
@@ -203,25 +177,13 @@ impl Model for LockIn {
         self.just_found()
     }
 
-    fn mark_displacement(&self, _: &Lit, _: &Light) -> f64 {
-        0.0
-    }
-
-    fn ready_share(&self, _: f64) -> f64 {
-        1.0
-    }
-
-    fn first_event(&self, awaited: &Awaited) -> FirstEvent {
-        FirstEvent::without_memory(awaited)
-    }
-
     fn summary(&self) -> String {
         format!(
             "lock-in pixel, {} taps a shot, each of {} electrons and with {} of noise; {}",
             self.modulation.taps(),
             self.full_well,
             self.read_noise,
-            self.sensitivity.summary()
+            self.sensitivity.summary_of("shot")
         )
     }
 

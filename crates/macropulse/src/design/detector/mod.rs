@@ -8,6 +8,7 @@
 //! list of this page, and a file in [`detect`](crate::detect).
 
 mod check;
+mod coherent;
 mod comparator;
 mod front_end;
 mod geiger;
@@ -24,6 +25,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 pub(in crate::design) use check::Efficiency;
+pub use coherent::Coherent;
 pub(in crate::design) use comparator::ComparatorFile;
 pub use comparator::{
     Comparator, DELAY as COMPARATOR_DELAY, FRACTION as COMPARATOR_FRACTION, LinearSetting, Timing,
@@ -45,7 +47,7 @@ use super::{Error, Light};
 /// this folder, and name. Every other list of them follows from these.
 macro_rules! kinds {
     (kinds { $($(#[$doc:meta])* $Kind:ident;)+ } tables { $($(#[$of:meta])* $file:ident, $name:literal;)+ }) => {
-        /// Light to detection events, to samples or to taps.
+        /// Light to detection events, to samples, to taps or to beats.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Detector {
             $($(#[$doc])* $Kind($Kind),)+
@@ -104,6 +106,8 @@ kinds! {
         SingleStop;
         /// Taps that collect light in step with its modulation.
         LockIn;
+        /// Light is mixed with that of the laser, and the beats of both are recorded.
+        Coherent;
     }
     tables {
         /// Every mark is a Bernoulli trial of its own.
@@ -116,6 +120,8 @@ kinds! {
         single_stop, "single-stop";
         /// Taps that collect light in step with its modulation; with [modulation].
         lock_in, "lock-in";
+        /// Light is mixed with that of the laser, and the beats of both are recorded; with [chirp] and [spectrum].
+        coherent, "coherent";
     }
 }
 
@@ -195,10 +201,14 @@ pub trait Model {
 
     /// Counts of sunlight per second that the file declares; 0 where they follow from optics and
     /// environment.
-    fn declared_background(&self) -> f64;
+    fn declared_background(&self) -> f64 {
+        0.0
+    }
 
     /// Standard deviation of its timing, s, where it is largest.
-    fn jitter(&self) -> f64;
+    fn jitter(&self) -> f64 {
+        0.0
+    }
 
     /// Standard deviation, s, of the time of a mark that is only just detected, the length of a
     /// micropulse of `light` included.
@@ -206,10 +216,14 @@ pub trait Model {
 
     /// Full width, s, of what it makes of the shortest mark: marks that follow each other sooner
     /// are one. 0 where it tells all apart.
-    fn response(&self) -> f64;
+    fn response(&self) -> f64 {
+        0.0
+    }
 
     /// For how long, fs, its state depends on the light that it has seen; 0 without memory.
-    fn memory_fs(&self) -> i64;
+    fn memory_fs(&self) -> i64 {
+        0
+    }
 
     /// For how long before what is asked of it all light must be known, fs, until what it puts out hangs on
     /// none before; 0 where each moment stands for itself.
@@ -224,13 +238,17 @@ pub trait Model {
     }
 
     /// Why it cannot be simulated in so much sunlight, and what to do, if it cannot.
-    fn refusal(&self, background: f64) -> Option<String>;
+    fn refusal(&self, _background: f64) -> Option<String> {
+        None
+    }
 
     /// Events per second that it would make without the light of any lidar, were it always ready.
     fn false_rate(&self, background: f64) -> f64;
 
     /// Noise of the amplitude and the threshold; `None` where there is none.
-    fn noise(&self, background: f64) -> Option<Noise>;
+    fn noise(&self, _background: f64) -> Option<Noise> {
+        None
+    }
 
     /// Probability that a mark makes an event.
     fn mark_pd(&self, lit: &Lit) -> f64;
@@ -239,13 +257,19 @@ pub trait Model {
     fn mark_jitter(&self, lit: &Lit) -> f64;
 
     /// Standard deviation, s, that the length of a micropulse of `light` adds to the time of a mark.
-    fn mark_displacement(&self, lit: &Lit, light: &Light) -> f64;
+    fn mark_displacement(&self, _lit: &Lit, _light: &Light) -> f64 {
+        0.0
+    }
 
     /// Share of what falls on it that its dead time leaves, `falling` detections per second in all.
-    fn ready_share(&self, falling: f64) -> f64;
+    fn ready_share(&self, _falling: f64) -> f64 {
+        1.0
+    }
 
     /// What a receiver finds that takes the first event in its gate.
-    fn first_event(&self, awaited: &Awaited) -> FirstEvent;
+    fn first_event(&self, awaited: &Awaited) -> FirstEvent {
+        FirstEvent::without_memory(awaited)
+    }
 
     /// What it is, in half a line for people.
     fn summary(&self) -> String;
@@ -272,10 +296,15 @@ const NEVER_MISSES: &str = "never misses";
 impl Sensitivity {
     /// How much light it is, in a few words for people.
     fn summary(&self) -> String {
+        self.summary_of("mark")
+    }
+
+    /// The same where the light of a shot comes in a `part` that is no mark.
+    fn summary_of(&self, part: &str) -> String {
         let Self { photons, range, reflectance } = self;
         match photons.is_finite() {
             true => {
-                format!("{photons:.2} photons a mark from reflectance {reflectance} at {range} m")
+                format!("{photons:.2} photons a {part} from reflectance {reflectance} at {range} m")
             }
             false => NEVER_MISSES.to_owned(),
         }

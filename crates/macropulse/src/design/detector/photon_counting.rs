@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Noise, Sensitivity, SensitivityFile,
-    Table, Typed, length_followed,
+    Detector, Follows, Idle, Lit, Model, Sensitivity, SensitivityFile, Table, Typed,
+    length_followed,
 };
 use crate::design::{Error, Light};
 
@@ -92,24 +92,8 @@ impl Model for PhotonCounting {
         libm::hypot(self.jitter, length_followed(light))
     }
 
-    fn response(&self) -> f64 {
-        0.0
-    }
-
-    fn memory_fs(&self) -> i64 {
-        0
-    }
-
-    fn refusal(&self, _: f64) -> Option<String> {
-        None
-    }
-
     fn false_rate(&self, background: f64) -> f64 {
         self.dark + background
-    }
-
-    fn noise(&self, _: f64) -> Option<Noise> {
-        None
     }
 
     /// (1 − m)·(1 − exp(−n)), m the marks lost for other reasons.
@@ -123,14 +107,6 @@ impl Model for PhotonCounting {
 
     fn mark_displacement(&self, _: &Lit, light: &Light) -> f64 {
         length_followed(light)
-    }
-
-    fn ready_share(&self, _: f64) -> f64 {
-        1.0
-    }
-
-    fn first_event(&self, awaited: &Awaited) -> FirstEvent {
-        FirstEvent::without_memory(awaited)
     }
 
     fn summary(&self) -> String {

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use macropulse_codec::decode::{Coupling, STEPS_OF_TICK, Sampling};
 use macropulse_codec::statistics::normal_tail;
 
-use super::{Awaited, FirstEvent, FrontEnd, Lit, Model, Noise, Sensitivity};
+use super::{FrontEnd, Lit, Model, Noise, Sensitivity};
 use crate::design::Light;
 use crate::units::{FS_PER_S, fs_from_s};
 
@@ -174,10 +174,6 @@ impl Model for Sampled {
         self.sensitivity
     }
 
-    fn declared_background(&self) -> f64 {
-        0.0
-    }
-
     /// Of a mark that is only just found by itself.
     fn jitter(&self) -> f64 {
         self.timing(FOUND * self.rms_noise(0.0).max(1.0), 0.0)
@@ -191,10 +187,6 @@ impl Model for Sampled {
         self.front_end.response()
     }
 
-    fn memory_fs(&self) -> i64 {
-        0
-    }
-
     /// The baseline, with the block in which a band begins and one for pulses that are not over there, and
     /// before that a clipped pulse that may still hold the amplifier.
     fn settles_fs(&self) -> i64 {
@@ -203,10 +195,6 @@ impl Model for Sampled {
             blocks => (blocks + 2) * BASELINE_BLOCK * fs_from_s(self.sample),
         };
         baseline_fs + fs_from_s(self.lingers())
-    }
-
-    fn refusal(&self, _: f64) -> Option<String> {
-        None
     }
 
     /// It makes no events.
@@ -227,18 +215,6 @@ impl Model for Sampled {
 
     fn mark_jitter(&self, lit: &Lit) -> f64 {
         self.timing(lit.photons.max(FOUND * self.rms_noise(lit.background)), lit.background)
-    }
-
-    fn mark_displacement(&self, _: &Lit, _: &Light) -> f64 {
-        0.0
-    }
-
-    fn ready_share(&self, _: f64) -> f64 {
-        1.0
-    }
-
-    fn first_event(&self, awaited: &Awaited) -> FirstEvent {
-        FirstEvent::without_memory(awaited)
     }
 
     fn summary(&self) -> String {

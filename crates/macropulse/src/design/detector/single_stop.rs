@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, NEVER_MISSES, Noise, SLICES,
-    Sensitivity, SensitivityFile, Table, Typed, slices_above,
+    Detector, Follows, Idle, Lit, Model, NEVER_MISSES, Noise, SLICES, Sensitivity, SensitivityFile,
+    Table, Typed, slices_above,
 };
 use crate::design::{Error, Light};
 use crate::units::RMS_OF_FWHM;
@@ -165,10 +165,6 @@ impl Model for SingleStop {
         self.sensitivity
     }
 
-    fn declared_background(&self) -> f64 {
-        0.0
-    }
-
     fn jitter(&self) -> f64 {
         self.jitter
     }
@@ -179,21 +175,9 @@ impl Model for SingleStop {
         libm::hypot(self.jitter, flank)
     }
 
-    fn response(&self) -> f64 {
-        0.0
-    }
-
-    fn memory_fs(&self) -> i64 {
-        0
-    }
-
     /// What fires it in a gate decides what else could have.
     fn has_state(&self) -> bool {
         true
-    }
-
-    fn refusal(&self, _: f64) -> Option<String> {
-        None
     }
 
     fn false_rate(&self, background: f64) -> f64 {
@@ -223,14 +207,6 @@ impl Model for SingleStop {
         let squares = slices_above(needed, mean, spread)
             .map(|photons| normal_order(needed, photons).1.powi(2));
         light.pulse * RMS_OF_FWHM * (squares.sum::<f64>() / f64::from(SLICES)).sqrt()
-    }
-
-    fn ready_share(&self, _: f64) -> f64 {
-        1.0
-    }
-
-    fn first_event(&self, awaited: &Awaited) -> FirstEvent {
-        FirstEvent::without_memory(awaited)
     }
 
     fn summary(&self) -> String {

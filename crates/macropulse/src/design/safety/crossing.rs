@@ -49,7 +49,7 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
         distance,
         scan_period: scan.period(),
         shot: light.pulse.max(s_from_fs(emission.length_fs())),
-        mark: emission.modulation().map_or(light.pulse, |it| s_from_fs(it.exposure_fs)),
+        mark: emission.part_fs().map_or(light.pulse, s_from_fs),
         brightest_shot: passed * energies.most(),
         brightest_mark: passed / emission.mean_parts(),
         count_groups: sender.count_groups,

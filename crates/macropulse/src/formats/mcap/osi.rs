@@ -65,6 +65,8 @@ struct LidarDetection {
     classification: Option<i32>,
     #[prost(double, optional, tag = "10")]
     reflectivity: Option<f64>,
+    #[prost(double, optional, tag = "12")]
+    radial_velocity: Option<f64>,
     #[prost(message, optional, tag = "13")]
     beam_id: Option<Identifier>,
 }
@@ -187,6 +189,7 @@ const MESSAGES: &[Described] = &[
             ("intensity", 7, Of::F8),
             ("classification", 9, Of::Kind(".osi3.DetectionClassification")),
             ("reflectivity", 10, Of::F8),
+            ("radial_velocity", 12, Of::F8),
             ("beam_id", 13, IDENTIFIER),
         ],
     ),
@@ -335,6 +338,7 @@ fn detection(cloud: &PointCloud, at: usize) -> LidarDetection {
         intensity: reflectivity.map(|reflectivity| (100.0 * reflectivity).clamp(0.0, 100.0)),
         classification: cloud.truth.returns.outcome.get(at).map(classification),
         reflectivity,
+        radial_velocity: cloud.radial_velocity.get(at).map(|&velocity| f64::from(velocity)),
         beam_id: cloud.row.get(at).and_then(|&row| identifier(row.into())),
     }
 }

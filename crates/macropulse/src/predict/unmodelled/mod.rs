@@ -99,11 +99,18 @@ impl Unmodelled {
     fn size(self, design: &Design, environment: &Environment, seen: &Sized) -> Option<String> {
         let budget = design.budget.as_ref();
         let is_modulated = design.emission.modulation().is_some();
+        let is_chirped = design.emission.chirp().is_some();
         match self {
             // Full taps are simulated, and no mark has a threshold.
-            Self::Saturation if is_modulated => None,
+            Self::Saturation if is_modulated || is_chirped => None,
             Self::AirReturn if is_modulated => (!environment.is_off(Surrounding::Atmosphere))
                 .then(|| "its phasor would add to that of every echo".to_owned()),
+            Self::AirReturn if is_chirped => (!environment.is_off(Surrounding::Atmosphere))
+                .then(|| "its beats would lie over those of the first metres".to_owned()),
+            Self::Crosstalk if is_chirped => None,
+            Self::MirrorImages if is_chirped => {
+                Some("an image has a beat of its own, and is found as a surface is".to_owned())
+            }
             Self::Crosstalk if is_modulated => Some(
                 "light that is scattered in the lens would add to the phasors of all pixels"
                     .to_owned(),

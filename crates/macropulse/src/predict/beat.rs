@@ -1,0 +1,180 @@
+//! What a receiver of beats finds of a target that frequency-modulated light meets.
+//!
+//! The field of an echo is a complex normal variable, so that its photons S in a ramp are exponential about their mean. In
+//! a bin beside its beat the field is that of S·h², h the amplitude of the window there, with the noise of a complex
+//! normal variable: its power exceeds γ with Marcum's Q₁(√(2·S·h²), √(2γ)). Of the two bins beside a beat the one with more
+//! power is the peak. Behind a window their noise is correlated, with ρ: both exceed γ at once with a probability that is
+//! taken to lie ρ² between that of independent powers and that of equal ones. A return needs a power of γ in each ramp, and
+//! of x in both together. Where in its bin a beat lies is an even chance, and so it is in each ramp. The line of the laser
+//! leaves less light in step, and lets beats wander.
+
+use std::f64::consts::PI;
+
+use macropulse_codec::decode::BeatMethod;
+use macropulse_codec::decode::beat::Ramp;
+use macropulse_codec::statistics::power_tail;
+
+use super::phase::Chances;
+use crate::design::detector::Coherent;
+use crate::design::{Design, Detector};
+use crate::units::{range_from_tof, tof_from_range};
+
+/// Powers between the least one that is recorded and that of a return without more in the other ramp.
+const STEPS: usize = 16;
+
+/// Places in a bin at which a beat may lie, from its middle to its edge.
+const PLACES: u32 = 6;
+
+/// Steps of the natural logarithm of the photons of a ramp, and from where to where.
+const FINE: f64 = 0.05;
+const PHOTONS: (f64, f64) = (-3.0, 9.0);
+
+/// A sensor of frequency-modulated light, and its receiver.
+#[derive(Debug, Clone)]
+pub(super) struct Beats {
+    coherent: Coherent,
+    false_alarm: f64,
+    /// Of every number of photons of a ramp, e to the steps of [`FINE`]: the probability of a return, and the mean power of
+    /// those of all ramps together.
+    found: Vec<Found>,
+}
+
+/// What becomes of so many photons.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    photons: f64,
+    pd: f64,
+    /// Amplitude of what is found over that of all.
+    brighter: f64,
+}
+
+impl Beats {
+    /// Of a sensor of frequency-modulated light; `None` of others.
+    pub fn of(design: &Design, method: &BeatMethod) -> Option<Self> {
+        let Detector::Coherent(coherent) = &design.detector else { return None };
+        let threshold = method.threshold(design.receiver.gate_fs());
+        let (least, ramps) = (method.least_power, method.ramps.len());
+        let step = (threshold - ramps as f64 * least) / STEPS as f64;
+        let powers: Vec<f64> = match ramps {
+            1 => vec![threshold],
+            _ => (0..=STEPS).map(|at| least + step * at as f64).collect(),
+        };
+        let count = ((PHOTONS.1 - PHOTONS.0) / FINE) as usize;
+        let photons = |at: usize| libm::exp(PHOTONS.0 + FINE * at as f64);
+        let tails =
+            |at: usize| powers.iter().map(|power| power_tail(1, photons(at), *power)).collect();
+        let tails: Vec<Vec<f64>> = (0..=count).map(tails).collect();
+        let aside = |place: u32| (f64::from(place) + 0.5) / f64::from(2 * PLACES);
+        let share = |aside: f64| method.window.amplitude(aside).powi(2);
+        let places: Vec<[f64; 2]> =
+            (0..PLACES).map(|place| [share(aside(place)), share(1.0 - aside(place))]).collect();
+        let [own, beside] = method.window.weights();
+        let alike = (2.0 * own * beside).powi(2);
+        let found = |at: usize| {
+            let of = |shares: &[f64; 2]| {
+                let [one, other] =
+                    shares.map(|share| between(&tails, libm::log(photons(at) * share)));
+                one.iter().zip(&other).map(|(one, other)| either([*one, *other], alike)).collect()
+            };
+            let seen: Vec<Vec<f64>> = places.iter().map(of).collect();
+            let pd = match ramps {
+                1 => seen.iter().map(|tails| tails[0]).sum::<f64>() / f64::from(PLACES),
+                _ => {
+                    let pairs =
+                        seen.iter().flat_map(|one| seen.iter().map(move |other| both(one, other)));
+                    pairs.sum::<f64>() / f64::from(PLACES * PLACES)
+                }
+            };
+            // The mean power of all, and at least the one that is asked for and one more.
+            let share = places.iter().map(|[nearer, _]| nearer).sum::<f64>() / f64::from(PLACES);
+            let mean = ramps as f64 * (1.0 + photons(at) * share);
+            let brighter = (mean.max(threshold + 1.0) / mean).sqrt();
+            Found { photons: photons(at), pd, brighter }
+        };
+        let found = (0..=count).map(found).collect();
+        Some(Self { coherent: coherent.clone(), false_alarm: method.false_alarm, found })
+    }
+
+    /// False returns of a shot that meets nothing.
+    pub fn false_alarm(&self) -> f64 {
+        self.false_alarm
+    }
+
+    /// What is found at `range` metres of so many detected photons of a shot, where `background` photons of sunlight are
+    /// detected per second.
+    pub fn chances(&self, range: f64, photons: f64, background: f64) -> Chances {
+        let Coherent { chirp, .. } = &self.coherent;
+        let tof = tof_from_range(range);
+        let shares = chirp.shares().into_iter().zip(chirp.ramps());
+        let in_step: f64 =
+            shares.map(|(share, ramp)| share * chirp.coherence(tof, ramp.seconds)).sum();
+        let ramps = chirp.ramps().len() as f64;
+        let mean = photons * in_step / ramps / self.coherent.noise(background);
+        let (mut all, mut pd, mut square) = (0.0, 0.0, 0.0);
+        for one in &self.found {
+            // The exponential variable over the steps of its logarithm.
+            let weight = one.photons / mean * libm::exp(-one.photons / mean);
+            all += weight * FINE;
+            pd += weight * FINE * one.pd;
+            square += weight * FINE * one.pd / (one.photons * one.brighter);
+        }
+        // Beyond the last step all are found, and all but those below the first.
+        pd += (libm::exp(-self.found[0].photons / mean) - all).max(0.0);
+        let spread = self.coherent.spread(1.0) / ramps.sqrt();
+        let window = self.coherent.spectrum.window;
+        let wander = |ramp: Ramp| chirp.wander(tof, ramp.seconds, window) / ramp.slope().powi(2);
+        let wander: f64 = chirp.ramps().into_iter().map(wander).sum::<f64>() / ramps.powi(2);
+        let noise = spread * spread * square / pd.max(f64::MIN_POSITIVE);
+        Chances {
+            pd: pd.min(1.0),
+            snr: (2.0 * ramps * mean).sqrt(),
+            precision: range_from_tof((noise + wander).sqrt()),
+            bound: range_from_tof(
+                6.0_f64.sqrt() / (2.0 * PI * chirp.bandwidth * (photons * in_step).sqrt()),
+            ),
+        }
+    }
+}
+
+/// The probabilities that powers are exceeded by a signal of this logarithm, between those that were worked out.
+fn between(tails: &[Vec<f64>], logarithm: f64) -> Vec<f64> {
+    let place = ((logarithm - PHOTONS.0) / FINE).clamp(0.0, (tails.len() - 1) as f64);
+    let (at, share) = (place as usize, place.fract());
+    let next = &tails[(at + 1).min(tails.len() - 1)];
+    tails[at].iter().zip(next).map(|(one, next)| one + share * (next - one)).collect()
+}
+
+/// The probability that one of two powers exceeds a third, each of which does with these probabilities; so far `alike` that
+/// 0 stands for independent ones and 1 for equal ones.
+fn either([one, other]: [f64; 2], alike: f64) -> f64 {
+    let both = one * other;
+    one + other - both - alike * (one.min(other) - both)
+}
+
+/// The probability that both powers exceed γ, and together x: `one` and `other` are the probabilities that each exceeds γ to
+/// x − γ, in equal steps.
+fn both(one: &[f64], other: &[f64]) -> f64 {
+    let last = one.len() - 1;
+    let within = (0..last).map(|at| {
+        // While the one lies in this step, the other has to exceed what is left.
+        (one[at] - one[at + 1]) * (other[last - at] + other[last - at - 1]) / 2.0
+    });
+    within.sum::<f64>() + one[last] * other[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Both exponential: the powers of noise in both ramps, e^−x·(1 + x − 2γ).
+    #[test]
+    fn two_powers_of_noise_exceed_a_sum_as_in_closed_form() {
+        let (least, threshold) = (2.0, 9.0);
+        let step = (threshold - 2.0 * least) / 400.0;
+        let tails: Vec<f64> =
+            (0..=400).map(|at| libm::exp(-(least + step * f64::from(at)))).collect();
+        let expected = libm::exp(-threshold) * (1.0 + threshold - 2.0 * least);
+        assert_relative_eq!(both(&tails, &tails), expected, max_relative = 1e-3);
+    }
+}
