@@ -23,6 +23,7 @@ fn again(
         _ if sensor.contains(MINI) => ("samples", "mpw"),
         _ if sensor.contains(FLASH) => ("histograms", "mph"),
         _ if sensor.contains(CAMERA) => ("taps", "mpa"),
+        _ if sensor.contains("fmcw") => ("beats", "mpb"),
         _ => ("ticks", "mpt"),
     };
     let formats = "--format pcd,csv,png";
@@ -131,6 +132,40 @@ fn taps_decode_to_the_points_of_the_simulation() {
     desk.refused(
         &format!("simulate {CAMERA} wall --format ticks -o b"),
         &["itof-camera records taps"],
+    );
+}
+
+/// A sensor of frequency-modulated light: its points have radial velocities, also those of a stream, and its header without
+/// any point.
+#[test]
+fn beats_decode_to_the_points_of_the_simulation() {
+    let desk = Desk::new();
+    let sensor = "--sensor fmcw-1550 --set scan.raster.rows=8 --set scan.raster.columns=60";
+    let wall = "--scene wall --set scene:object.wall.velocity_m_s=[-3,0,0]";
+    let (simulated, _) = again(&desk, sensor, wall, 2);
+    assert!(simulated["counts"]["peaks"].as_u64().unwrap() > 200, "{simulated}");
+    let line = format!(
+        "decode {sensor} --set chirp.down_us=0 out/shots-000000.mps out/beats-000000.mpb -o b --format none"
+    );
+    desk.refused(&line, &["2 ramps of a shot with 8 peaks each, where the sensor has 1 with 8"]);
+    let line = format!("simulate {sensor} {wall} --explain 4,30 --format csv -o e");
+    let ran = desk.run(&line);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let points = fs::read_to_string(desk.path().join("e/scan-000000.csv")).unwrap();
+    assert!(points.lines().next().unwrap().ends_with(",flags,radial_velocity_m_s"));
+    let told = fs::read_to_string(desk.path().join("e/explain-000000-4-30.txt")).unwrap();
+    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        told.contains("times the mean power of noise") && told.contains(" m/s: power "),
+        "{told}"
+    );
+    let away = format!("simulate {sensor} {wall} --set scene:sensor.yaw_deg=180 --format csv -o n");
+    assert_eq!(desk.run(&away).code, Some(0));
+    let nothing = fs::read_to_string(desk.path().join("n/scan-000000.csv")).unwrap();
+    assert_eq!(nothing.trim_end(), points.lines().next().unwrap());
+    desk.refused(
+        &format!("simulate {sensor} {wall} --format taps -o b"),
+        &["fmcw-1550 records beats"],
     );
 }
 

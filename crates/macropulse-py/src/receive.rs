@@ -478,6 +478,11 @@ impl Number for f32 {
     const IS_WHOLE: bool = false;
 }
 
+impl Number for f64 {
+    const WORDS: &'static str = "finite numbers";
+    const IS_WHOLE: bool = false;
+}
+
 /// A column of a dictionary, copied; whole numbers that do not fit are refused, not cut.
 fn column<T: Number>(
     given: &Bound<'_, PyDict>,

@@ -144,8 +144,8 @@ pub(super) struct ChirpFile {
     /// How far the frequency strays from its ramps, as a sine over time, MHz. Left out: 0.
     #[schemars(range(min = 0, max = 1e5))]
     error_mhz: Option<f64>,
-    /// How often per second it does, kHz.
-    #[schemars(range(min = 0.001, max = 1e6))]
+    /// How often per second it does, kHz; with `error_mhz`.
+    #[schemars(range(min = 0, max = 1e6))]
     error_khz: Option<f64>,
 }
 
@@ -169,8 +169,7 @@ impl Check<'_> {
         };
         let up = seconds("chirp.up_us", file.up_us, 1e-3)?;
         let down = match file.down_us {
-            Some(0.0) => 0.0,
-            Some(typed) => seconds("chirp.down_us", typed, 1e-3)?,
+            Some(typed) => seconds("chirp.down_us", typed, 0.0)?,
             None => up,
         };
         let flight = tof_from_range(farthest);

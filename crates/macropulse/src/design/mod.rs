@@ -56,7 +56,7 @@ pub use schema::schema;
 pub use work::SHOTS_OF_BAND;
 
 use crate::digest::Digest;
-use macropulse_codec::decode::Receiver;
+use macropulse_codec::decode::{Method, Receiver};
 
 /// Keys of a sensor file that exclude each other, by their table. A table that has a name has exactly one of them;
 /// the front end tells which one stands at the top of the file, if any.
@@ -118,6 +118,11 @@ impl Design {
     ) -> Result<Self, Error> {
         let (text, origin, folder) = document::open(name_or_file.as_ref(), Path::new(""))?;
         Self::from_toml(&text, &origin, &folder, overrides)
+    }
+
+    /// Whether its receiver measures radial velocities.
+    pub fn measures_speed(&self) -> bool {
+        matches!(&self.receiver.method, Method::Beat(method) if method.ramps.len() > 1)
     }
 
     /// Detections per photon that reaches the detector. A sensor that declares its sensitivity leaves this open:

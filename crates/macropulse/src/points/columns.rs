@@ -381,6 +381,9 @@ impl Attribute {
             // A row without a column is the ring of a driver.
             Self::Row => has(self) && has(Self::Column),
             Self::Flags => has(self) || has(Self::Marks),
+            Self::RadialVelocity | Self::TrueRadialVelocity if cloud.returns() == 0 => {
+                cloud.has_speeds && (!self.is_true() || cloud.has_truth())
+            }
             _ if self.comes_with_truth() => cloud.has_truth(),
             _ => has(self),
         }

@@ -87,6 +87,8 @@ pub struct PointCloud {
     pub returns_per_shot: u8,
     /// Which return of a pixel its image shows.
     pub pick: Pick,
+    /// Whether the sensor measures radial velocities: says of a cloud without returns whether it has their column.
+    pub has_speeds: bool,
     /// Row of the pixel.
     pub row: Vec<u16>,
     /// Column of the pixel.
@@ -292,6 +294,7 @@ impl PointCloud {
             columns,
             returns_per_shot: design.receiver.returns,
             pick: design.receiver.pick,
+            has_speeds: design.measures_speed(),
             ..Self::default()
         }
     }

@@ -47,6 +47,7 @@ impl Piece {
         points.scan = scan;
         (points.rows, points.columns) = (design.scan.rows as usize, design.scan.columns as usize);
         (points.returns_per_shot, points.pick) = (design.receiver.returns, design.receiver.pick);
+        points.has_speeds = design.measures_speed();
         let time_ns = |fired_at_fs: i64| fired_at_fs as f64 * 1e-6;
         let (owned, columns) = (log.owned.clone(), points.columns as u32);
         let pixels = log.row[owned.clone()].iter().zip(&log.column[owned.clone()]);
