@@ -10,6 +10,7 @@ use std::f64::consts::TAU;
 use macropulse_codec::{ShotLog, Taps};
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
+use super::own_by_shot;
 use crate::channel::Light;
 use crate::design::detector::LockIn;
 use crate::design::{Design, Modulation};
@@ -31,7 +32,7 @@ impl Demodulator {
 
     /// The taps of the owned shots of `log`, in their order.
     pub fn taps(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Taps {
-        let (own, others) = sorted(light);
+        let (own, others) = (own_by_shot(light), pulses_of_others(light));
         let taps = self.lock_in.modulation.taps();
         let steady = self.lock_in.dark + light.background.steady * self.efficiency;
         let of_each = steady * s_from_fs(self.lock_in.modulation.exposure_fs);
@@ -136,19 +137,14 @@ impl Demodulator {
     }
 }
 
-/// Pulse trains of the sensor itself by the number of their shot, and the pulses of others by channel and arrival.
-#[expect(clippy::type_complexity, reason = "two lists of keys and places")]
-fn sorted(light: &Light) -> (Vec<(u64, usize)>, Vec<(u16, i64, usize)>) {
+/// The pulses of other lidars by channel and arrival, each with its train.
+fn pulses_of_others(light: &Light) -> Vec<(u16, i64, usize)> {
     let trains = &light.trains;
-    let is_own = |train: &usize| trains.transmitter[*train] == 0;
-    let mut own: Vec<_> =
-        (0..trains.len()).filter(is_own).map(|train| (trains.shot[train], train)).collect();
-    own.sort_unstable();
     let mut others = Vec::new();
-    for train in (0..trains.len()).filter(|train| !is_own(train)) {
+    for train in (0..trains.len()).filter(|train| trains.transmitter[*train] != 0) {
         let channel = trains.channel[train];
         others.extend(light.arrivals_fs(train).map(|arrives| (channel, arrives, train)));
     }
     others.sort_unstable();
-    (own, others)
+    others
 }

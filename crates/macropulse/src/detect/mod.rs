@@ -265,6 +265,15 @@ impl Memory {
     }
 }
 
+/// Pulse trains of the sensor itself, each with the number of its shot, in the order of shots.
+fn own_by_shot(light: &Light) -> Vec<(u64, usize)> {
+    let trains = &light.trains;
+    let own = (0..trains.len()).filter(|train| trains.transmitter[*train] == 0);
+    let mut own: Vec<_> = own.map(|train| (trains.shot[train], train)).collect();
+    own.sort_unstable();
+    own
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

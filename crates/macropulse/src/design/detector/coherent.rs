@@ -7,7 +7,7 @@ use macropulse_codec::decode::BeatMethod;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Detector, Follows, Idle, Lit, Model, Sensitivity, Table, Typed};
+use super::{Detector, Lit, Model, Sensitivity, Table, Typed};
 use crate::design::{Chirp, Emission, Error, Light, Readout, Spectrum};
 
 /// A return that is only just found has this power in each ramp, in units of that of noise.
@@ -51,18 +51,6 @@ pub struct Coherent {
 impl Typed for File {
     fn efficiency(&self) -> Option<f64> {
         Some(self.efficiency * self.mixing_efficiency)
-    }
-
-    fn idle(&self) -> Idle {
-        Idle::NONE
-    }
-
-    fn follows(&self) -> Follows {
-        Follows { bandwidth: true, neighbouring_chips: true }
-    }
-
-    fn is_single_stop(&self) -> bool {
-        false
     }
 
     fn check(&self, table: &Table) -> Result<Detector, Error> {

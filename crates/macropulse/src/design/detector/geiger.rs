@@ -6,8 +6,8 @@ use serde::Deserialize;
 
 use super::table::MOST_COUNTS;
 use super::{
-    Awaited, Detector, FirstEvent, Follows, Idle, Lit, Model, Sensitivity, SensitivityFile, Table,
-    Typed, length_followed,
+    Awaited, Detector, FirstEvent, Idle, Lit, Model, Sensitivity, SensitivityFile, Table, Typed,
+    length_followed,
 };
 use crate::design::{Error, Light};
 use crate::units::{fs_from_s, s_from_fs};
@@ -99,14 +99,6 @@ impl Typed for File {
 
     fn idle(&self) -> Idle {
         Idle::EITHER
-    }
-
-    fn follows(&self) -> Follows {
-        Follows { bandwidth: true, neighbouring_chips: true }
-    }
-
-    fn is_single_stop(&self) -> bool {
-        false
     }
 
     fn check(&self, table: &Table) -> Result<Detector, Error> {

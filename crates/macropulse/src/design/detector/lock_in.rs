@@ -8,7 +8,7 @@ use macropulse_codec::decode::phase::Tone;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Detector, Follows, Idle, Lit, Model, Sensitivity, Table, Typed};
+use super::{Detector, Lit, Model, Sensitivity, Table, Typed};
 use crate::design::{Emission, Error, Light, Modulation};
 
 /// Share of the codes that are below that of a tap which has collected nothing, so that noise is not cut off.
@@ -67,18 +67,6 @@ pub struct LockIn {
 impl Typed for File {
     fn efficiency(&self) -> Option<f64> {
         Some(self.efficiency)
-    }
-
-    fn idle(&self) -> Idle {
-        Idle::NONE
-    }
-
-    fn follows(&self) -> Follows {
-        Follows { bandwidth: true, neighbouring_chips: true }
-    }
-
-    fn is_single_stop(&self) -> bool {
-        false
     }
 
     fn check(&self, table: &Table) -> Result<Detector, Error> {

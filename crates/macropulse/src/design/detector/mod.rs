@@ -148,14 +148,21 @@ pub(in crate::design) trait Typed {
     /// Detections per photon, if the file says it, under the key `efficiency`.
     fn efficiency(&self) -> Option<f64>;
 
-    /// Which of its keys are without effect.
-    fn idle(&self) -> Idle;
+    /// Which of its keys are without effect; none, unless a kind says so.
+    fn idle(&self) -> Idle {
+        Idle::NONE
+    }
 
-    /// What of the light it follows. A sensor must declare that it leaves out the rest.
-    fn follows(&self) -> Follows;
+    /// What of the light it follows. A sensor must declare that it leaves out the rest. All of it,
+    /// unless a kind says so.
+    fn follows(&self) -> Follows {
+        Follows { bandwidth: true, neighbouring_chips: true }
+    }
 
     /// Whether it puts out no more than one event per shot.
-    fn is_single_stop(&self) -> bool;
+    fn is_single_stop(&self) -> bool {
+        false
+    }
 
     /// Whether it puts out a signal, for a comparator or an ADC.
     fn has_signal(&self) -> bool {

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::comparator::{ComparatorFile, threshold_over_noise};
 use super::sampled::{MOST_REMEMBERED, REACH, remembered};
 use super::table::MOST_COUNTS;
-use super::{Comparator, Detector, Follows, FrontEnd, Idle, Linear, Sampled, Table, Timing, Typed};
+use super::{Comparator, Detector, FrontEnd, Linear, Sampled, Table, Timing, Typed};
 use crate::design::Error;
 use crate::design::budget::Budget;
 use crate::design::limits::Check;
@@ -80,18 +80,6 @@ pub(super) struct File {
 impl Typed for File {
     fn efficiency(&self) -> Option<f64> {
         Some(self.efficiency)
-    }
-
-    fn idle(&self) -> Idle {
-        Idle::NONE
-    }
-
-    fn follows(&self) -> Follows {
-        Follows { bandwidth: true, neighbouring_chips: true }
-    }
-
-    fn is_single_stop(&self) -> bool {
-        false
     }
 
     fn has_signal(&self) -> bool {

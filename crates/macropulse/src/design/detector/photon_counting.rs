@@ -60,10 +60,6 @@ impl Typed for File {
         Follows { bandwidth: false, neighbouring_chips: true }
     }
 
-    fn is_single_stop(&self) -> bool {
-        false
-    }
-
     fn check(&self, table: &Table) -> Result<Detector, Error> {
         Ok(Detector::PhotonCounting(PhotonCounting {
             sensitivity: table.sensitivity(self.sensitivity.as_ref(), |pd| -(-pd).ln_1p())?,

@@ -23,6 +23,7 @@ use macropulse_codec::{Beats, Peak, ShotLog};
 use rand_distr::{Distribution, StandardNormal};
 use rustfft::num_complex::Complex64;
 
+use super::own_by_shot;
 use crate::channel::Light;
 use crate::design::detector::Coherent;
 use crate::design::{Design, Fidelity};
@@ -40,6 +41,8 @@ pub(super) struct Mixer {
     efficiency: f64,
     /// Noise over the shot noise of the laser.
     noise: f64,
+    /// Power from which on a peak is recorded.
+    least_power: f64,
     ramps: Vec<RampBins>,
     way: Way,
 }
@@ -100,7 +103,8 @@ impl Mixer {
             Fidelity::Waveform => Way::Waveforms(Waveforms::new(coherent, &ramps)),
         };
         let noise = coherent.noise(background);
-        Self { coherent: coherent.clone(), efficiency: design.efficiency(), noise, ramps, way }
+        let (efficiency, least_power) = (design.efficiency(), coherent.least_power());
+        Self { coherent: coherent.clone(), efficiency, noise, least_power, ramps, way }
     }
 
     /// The beats of the owned shots of `log`, in their order.
@@ -108,7 +112,7 @@ impl Mixer {
         let peaks = self.coherent.spectrum.peaks;
         let mut beats = Beats { ramps: self.ramps.len() as u32, peaks, found: Vec::new() };
         beats.found.reserve(log.owned.len() * self.ramps.len() * peaks as usize);
-        let own = own(light);
+        let own = own_by_shot(light);
         for shot in log.owned.clone() {
             let number = log.first + shot as u64;
             let paths = self.paths(chance, (number, log.fired_at_fs[shot]), (&own, light));
@@ -152,7 +156,6 @@ impl Mixer {
 
     /// The peaks of all ramps of shot `number`, whose light comes along `paths`.
     fn peaks(&self, chance: &Chance, number: u64, paths: &[Path]) -> Vec<Vec<Peak>> {
-        let least = self.coherent.least_power();
         let doppler = 2.0 / self.coherent.wavelength;
         let phases = match &self.way {
             Way::Waveforms(waveforms) => waveforms.phases(chance, number),
@@ -169,7 +172,7 @@ impl Mixer {
             let part = number_of_ramp << 20;
             let mut stream = chance.stream(Address { stage: Stage::Spectrum, index: number, part });
             match &self.way {
-                Way::Spectra(spectra) => spectra.peaks(ramp, &tones, least, &mut stream),
+                Way::Spectra(spectra) => spectra.peaks(ramp, &tones, self.least_power, &mut stream),
                 Way::Waveforms(waveforms) => {
                     let bins = waveforms.bins(
                         number_of_ramp as usize,
@@ -178,7 +181,8 @@ impl Mixer {
                         &mut stream,
                     );
                     let mut found = Vec::new();
-                    bins.behind(self.coherent.spectrum.window).peaks(&ramp.bins, least, &mut found);
+                    let bins = bins.behind(self.coherent.spectrum.window);
+                    bins.peaks(&ramp.bins, self.least_power, &mut found);
                     found
                 }
             }
@@ -197,13 +201,4 @@ fn normal(stream: &mut Stream) -> Complex64 {
 /// e^iφ. Not that of the standard library, which depends on the system.
 fn turned(phase: f64) -> Complex64 {
     Complex64::new(libm::cos(phase), libm::sin(phase))
-}
-
-/// Pulse trains of the sensor itself by the number of their shot.
-fn own(light: &Light) -> Vec<(u64, usize)> {
-    let trains = &light.trains;
-    let own = (0..trains.len()).filter(|train| trains.transmitter[*train] == 0);
-    let mut own: Vec<_> = own.map(|train| (trains.shot[train], train)).collect();
-    own.sort_unstable();
-    own
 }
