@@ -1,6 +1,7 @@
 //! The tests of the Python package, run by pytest on a package that `pip install .` has made.
 #![allow(clippy::unwrap_used)]
 
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -57,6 +58,26 @@ fn wheel() -> &'static Path {
         let mut made = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
         made.find(|file| file.extension().is_some_and(|ending| ending == "whl")).unwrap()
     })
+}
+
+/// Packages and their features, as in `cargo tree` with `options`, this one left out.
+fn compiled(options: &[&str]) -> BTreeSet<String> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let form = ["tree", "--no-dedupe", "--prefix", "none", "--format", "{p} {f}"];
+    let printed = call(Command::new(cargo).current_dir(here()).args(form).args(options)).unwrap();
+    let others = printed.lines().filter(|line| !line.starts_with("macropulse-py "));
+    others.map(str::to_owned).collect()
+}
+
+/// A dependency with fewer features than in a run of all tests would be compiled again, and all that uses it.
+#[test]
+fn the_package_is_made_of_what_is_compiled_already() {
+    let tests = compiled(&["--workspace"]);
+    let package = compiled(&["-p", "macropulse-py", "--features", "as-in-tests", "-e", "no-dev"]);
+    let more: Vec<_> = package.difference(&tests).collect();
+    assert!(more.is_empty(), "for `as-in-tests` in Cargo.toml: {more:#?}");
+    let bare = compiled(&["-p", "macropulse-py", "-e", "no-dev"]);
+    assert_ne!(bare.difference(&tests).count(), 0);
 }
 
 /// A folder with the package and nothing else, for any interpreter.
