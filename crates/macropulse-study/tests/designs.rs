@@ -12,7 +12,7 @@ use macropulse_study::budget::{Figures, usual};
 use macropulse_study::designs::{Found, Requirements, Search, make_room};
 
 /// A corner of the field of the paper, so often that the shots of three beams follow each other as soon as
-/// those of fifteen do in its whole field: a search of half a minute.
+/// those of fifteen do in its whole field: a search of 20 s.
 const SMALL: &str = r#"
 version = 1
 name = "small"
@@ -28,7 +28,7 @@ reflectance = 0.5
 [parts]
 detectors = ["inalas"]
 marks = [1, 3]
-beams = [3, 5, 10, 15, 30]
+beams = [15, 30]
 facets = [24]
 polygon_mm = 700.0
 "#;
@@ -135,7 +135,7 @@ fn an_easy_task_needs_no_code() {
         ("scans_per_s = 800.0", "scans_per_s = 20.0"),
         ("range_m = 150.0", "range_m = 40.0"),
         ("clutter_m = 300.0", "clutter_m = 80.0"),
-        ("beams = [3, 5, 10, 15, 30]", "beams = [1]"),
+        ("beams = [15, 30]", "beams = [1]"),
     ];
     let folder = tempfile::tempdir().unwrap();
     let found = found(&easy, folder.path(), 1);
@@ -181,7 +181,7 @@ fn beams_for_which_no_word_fits_are_skipped_and_listed() {
     let dark = [
         ("reflectance = 0.5", "reflectance = 0.001"),
         ("scans_per_s = 800.0", "scans_per_s = 1800.0"),
-        ("beams = [3, 5, 10, 15, 30]", "beams = [1, 3, 10]"),
+        ("beams = [15, 30]", "beams = [1, 3, 10]"),
         ("facets = [24]", "facets = [50]"),
         ("marks = [1, 3]", "marks = [4]"),
     ];

@@ -92,20 +92,19 @@ fn strays(score: &Score) -> [u64; 2] {
     [count(&[Outcome::Wrong, Outcome::False]), count(&all)]
 }
 
-/// H0: no more than one shot in ten thousand gives a point where nothing is. N = 12 000 to 23 000
-/// shots of each sensor at each fence, half of them without a target, and as many at the dark sphere, seed
-/// 77; ten points or more come with α = 1e-4 or less (Poisson). Whole scans had none at the fences, 1 at
-/// the sphere with kim-park-2016-fixed, 16 with coded-360. Control: with short words of three marks and
-/// every second false return accepted there are many.
+/// H0: no more than one shot in ten thousand gives a point where nothing is. N = 4000 to 8000 shots of each
+/// sensor at each fence, half of them without a target, and as many at the dark sphere, seed 77. Six points or
+/// more come with α = 2e-4 or less (Poisson). Whole scans had none at the fences, 1 at the sphere with
+/// kim-park-2016-fixed, 16 with coded-360. Control: with short words of three marks and every second false
+/// return accepted there are many.
 ///
-/// The light of all shots of bipolar-gold lies in step, so of it more is asked: none of more than 40 000
-/// shots, which bounds the share from above by 1 − 0.025^(1/N) = 9.2e-5 (Clopper–Pearson, 95 % two-sided).
+/// The light of all shots of bipolar-gold lies in step, so it must have none.
 #[test]
 fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
     for (sensor, columns, degrees) in SENSORS {
         let scenes = [fence(30.0, (columns, degrees)), fence(100.0, (columns, degrees)), dark()];
         let (every, fewest, most) =
-            if sensor == "bipolar-gold" { (8, 40_000, 0) } else { (24, 12_000, 9) };
+            if sensor == "bipolar-gold" { (72, 4000, 0) } else { (72, 4000, 5) };
         for (number, scene) in scenes.iter().enumerate() {
             let score = scan(sensor, &[], (scene, every));
             let [strays, shots] = strays(&score);
@@ -114,7 +113,7 @@ fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
             let (empty, right) = (score.count(Outcome::Empty), score.count(Outcome::Right));
             let all_seen = score.count(Outcome::Missed) < shots / 500;
             assert!(
-                number == 2 || (empty > 5000 && right > 5000 && all_seen),
+                number == 2 || (empty > 1500 && right > 1500 && all_seen),
                 "{sensor}, scene {number}: {empty} empty, {right} right"
             );
         }
@@ -126,22 +125,23 @@ fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
         ("code.word.modulus", "20"),
         ("without", "inter-chip"),
     ];
-    let [strays, _] = strays(&scan("coded-practical", &accepted, (&fence(30.0, (848, 43.2)), 12)));
-    assert!(strays > 50, "{strays}");
+    let [strays, _] = strays(&scan("coded-practical", &accepted, (&fence(30.0, (848, 43.2)), 48)));
+    assert!(strays > 12, "{strays}");
 }
 
 /// H0: no more than one empty pixel in 20 000 shows light of posts behind the gate, as far away as a word is sent again,
-/// so that the light of each comes early in the gate of a shot in the same word. A scan of 407 040 shots, seed 77, with
-/// a gate of 150 m; more than 39 come with α = 1e-4 (Poisson, mean 20). Control: without labels there are more.
+/// so that the light of each comes early in the gate of a shot in the same word. N > 80 000 shots, one fifth of a scan,
+/// seed 77, with a gate of 150 m; more than 13 come with α = 1e-4 (Poisson, mean 4.1). Control: without labels there are
+/// more.
 #[test]
 fn posts_behind_the_gate_are_not_seen_in_front_of_it() {
     let scene = posts(171.85);
-    let strays_of = |keys: &[(&str, &str)]| strays(&scan("kim-park-2016-fixed", keys, (&scene, 1)));
+    let strays_of = |keys: &[(&str, &str)]| strays(&scan("kim-park-2016-fixed", keys, (&scene, 5)));
     let [found, shots] = strays_of(&[]);
-    assert_eq!(shots, 407_040);
-    assert!(found <= 39, "{found}");
+    assert!((80_000..83_000).contains(&shots), "{shots}");
+    assert!(found <= 13, "{found}");
     let [unlabelled, _] = strays_of(&[("code.label", "\"none\"")]);
-    assert!(unlabelled > 39, "{unlabelled}");
+    assert!(unlabelled > 13, "{unlabelled}");
 }
 
 /// H0: where half of the shots are seen, no more than one in 10 000 takes light of another for its own. Of

@@ -24,7 +24,7 @@ const SHARPLY_SQUARE_ON: f32 = 0.3;
 
 /// Of coded sensors, whose scans take long, so many rows in the middle of a scan; and where only a few
 /// columns are looked at.
-const ROWS: [u32; 2] = [4, 12];
+const ROWS: [u32; 2] = [1, 6];
 
 /// A sensor, the sun it works in, and reflectance and range of a wall that is so dark that even a counter
 /// of marks can tell how dark; none of eight marks across a threshold, between nothing and all of

@@ -39,7 +39,7 @@ fn both_ways(
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn ticks_of_marks_are_those_of_their_events(
         late in proptest::collection::vec(0..1_u32 << 30, 1..80),

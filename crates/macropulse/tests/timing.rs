@@ -4,6 +4,7 @@
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands, short_bands};
@@ -43,6 +44,11 @@ impl Sums {
         self.1 / self.0
     }
 
+    /// The sum of squares, if every error were `shift` ticks more.
+    fn squares_if_moved(&self, shift: f64) -> f64 {
+        self.2 + shift * (2.0 * self.1 + shift * self.0)
+    }
+
     /// By how many of its standard errors the mean is beyond a tenth of a tick.
     fn excess(&self) -> f64 {
         self.excess_if_moved(0.0)
@@ -56,19 +62,33 @@ impl Sums {
     }
 }
 
-/// Errors of range in ticks, each moved by `shift` of them: of all points at each range, and of those
-/// of each word. Of each range so many bands.
-fn errors(
-    design: &Design,
-    environment: &str,
-    (count, shift): (usize, f64),
-) -> (Vec<Sums>, HashMap<u16, Sums>) {
+/// Errors of range in ticks: of all points at each range, and of those of each word.
+type Errors = (Vec<Sums>, HashMap<u16, Sums>);
+
+/// Ready sensors with a code, and the sun they work in.
+const CODED: [(&str, &str); 6] = [
+    ("kim-park-2016", "clear-day"),
+    ("kim-park-2016-fixed", "clear-day"),
+    ("kim-park-2016-physical", "vacuum-dark"),
+    ("coded-practical", "clear-day"),
+    ("coded-360", "clear-day"),
+    ("bipolar-gold", "clear-day"),
+];
+
+/// The errors of one of [`CODED`], measured once for all tests.
+fn errors_of(sensor: usize) -> &'static Errors {
+    static MEASURED: [OnceLock<Errors>; CODED.len()] = [const { OnceLock::new() }; CODED.len()];
+    let (name, environment) = CODED[sensor];
+    MEASURED[sensor].get_or_init(|| errors(&Design::open(name, &[]).unwrap(), environment))
+}
+
+/// Of each range one band.
+fn errors(design: &Design, environment: &str) -> Errors {
     let all: Vec<Band> = short_bands(design, 0).collect();
     let (mut of_range, mut of_word) = (Vec::new(), HashMap::<u16, Sums>::new());
     let metres = design.clock.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
     for (number, range) in RANGES.into_iter().enumerate() {
-        let part: Vec<Band> =
-            all.iter().skip(number % all.len()).step_by(11).take(count).copied().collect();
+        let part: Vec<Band> = vec![all[number % all.len()]];
         let mut words = HashMap::new();
         for log in part.iter().map(|band| band.shot_log(design)) {
             for shot in log.owned.clone() {
@@ -79,7 +99,7 @@ fn errors(
         let cloud = sim::scan_part(design, &room, 1, &part).unwrap().cloud();
         let mut sums = Sums::default();
         for at in 0..cloud.range.len() {
-            let error = (f64::from(cloud.range[at]) - range) / metres + shift;
+            let error = (f64::from(cloud.range[at]) - range) / metres;
             // False returns are no measurement of this target.
             if error.abs() * metres > design.right_within {
                 continue;
@@ -102,19 +122,11 @@ fn errors(
 #[test]
 fn coded_sensors_measure_ranges_without_bias() {
     let mut biased = Vec::new();
-    for (name, environment) in [
-        ("kim-park-2016", "clear-day"),
-        ("kim-park-2016-fixed", "clear-day"),
-        ("kim-park-2016-physical", "vacuum-dark"),
-        ("coded-practical", "clear-day"),
-        ("coded-360", "clear-day"),
-        ("bipolar-gold", "clear-day"),
-    ] {
-        let design = Design::open(name, &[]).unwrap();
-        let (of_range, of_word) = errors(&design, environment, (1, 0.0));
+    for (sensor, (name, _)) in CODED.into_iter().enumerate() {
+        let (of_range, of_word) = errors_of(sensor);
         let blinding = if name == "kim-park-2016-physical" { 10.0 } else { 0.0 };
         let told = |(range, sums): &(&f64, &Sums)| **range > blinding && sums.0 > 50.0;
-        for (range, sums) in RANGES.iter().zip(&of_range).filter(told) {
+        for (range, sums) in RANGES.iter().zip(of_range).filter(told) {
             let mean = sums.1 / sums.0;
             if sums.excess() > 4.5 {
                 biased.push(format!("{name} at {range} m: {mean:+.3} ticks"));
@@ -128,9 +140,8 @@ fn coded_sensors_measure_ranges_without_bias() {
         }
     }
     assert!(biased.is_empty(), "{biased:?}");
-    let design = Design::open("kim-park-2016", &[]).unwrap();
-    let (of_range, _) = errors(&design, "clear-day", (1, 0.5));
-    assert!(of_range.iter().all(|sums| sums.excess() > 4.5), "the control was not rejected");
+    let control = |sums: &Sums| sums.excess_if_moved(0.5) > 4.5;
+    assert!(errors_of(0).0.iter().all(control), "the control was not rejected");
 }
 
 /// Errors of range in ticks at each of the ranges, in whole scans, each range with a seed of its own.
@@ -159,32 +170,33 @@ fn errors_of_scans(design: &Design, material: &str, scans: u64) -> [Sums; 10] {
 #[test]
 fn points_are_as_precise_as_forecast() {
     let mut worse = Vec::new();
-    for (name, environment) in [
-        ("kim-park-2016", "clear-day"),
-        ("kim-park-2016-fixed", "clear-day"),
-        ("coded-practical", "clear-day"),
-        ("coded-360", "clear-day"),
-        ("bipolar-gold", "clear-day"),
-    ] {
+    for (sensor, (name, environment)) in CODED.into_iter().enumerate() {
+        // Its light near by is more than it can time.
+        if name == "kim-park-2016-physical" {
+            continue;
+        }
         let design = Design::open(name, &[]).unwrap();
-        let (of_range, _) = errors(&design, environment, (1, 0.0));
-        let ratio = against_forecast(&design, environment, &of_range);
+        let ratio = against_forecast(&design, environment, (&errors_of(sensor).0, 0.0));
         worse.extend((ratio > 1.2).then(|| format!("{name}: {ratio:.3} of the forecast")));
     }
     for (name, scans) in [("vlp-16", 1), ("hdl-64e", 1), ("peregrine", 3)] {
         let design = Design::open(name, &[]).unwrap();
-        let ratio =
-            against_forecast(&design, "clear-day", &errors_of_scans(&design, "white", scans));
+        let ratio = against_forecast(
+            &design,
+            "clear-day",
+            (&errors_of_scans(&design, "white", scans), 0.0),
+        );
         worse.extend((ratio > 1.2).then(|| format!("{name}: {ratio:.3} of the forecast")));
     }
     assert!(worse.is_empty(), "{worse:?}");
+    let sensor = CODED.iter().position(|(name, _)| *name == "coded-practical").unwrap();
     let design = Design::open("coded-practical", &[]).unwrap();
-    let (moved, _) = errors(&design, "clear-day", (1, 0.5));
-    assert!(against_forecast(&design, "clear-day", &moved) > 1.2, "the control was not rejected");
+    let control = against_forecast(&design, "clear-day", (&errors_of(sensor).0, 0.5));
+    assert!(control > 1.2, "the control was not rejected");
 }
 
-/// The rms error over all ranges, of white, over the forecast of it.
-fn against_forecast(design: &Design, environment: &str, of_range: &[Sums]) -> f64 {
+/// The rms error over all ranges, of white, if every error were `shift` ticks more, over the forecast of it.
+fn against_forecast(design: &Design, environment: &str, (of_range, shift): (&[Sums], f64)) -> f64 {
     let around = Environment::named(environment).unwrap();
     let forecaster = Forecaster::new(design, &around).unwrap();
     let metres = design.clock.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
@@ -192,7 +204,7 @@ fn against_forecast(design: &Design, environment: &str, of_range: &[Sums]) -> f6
     let pairs: Vec<[f64; 2]> = told
         .map(|(range, sums)| {
             let forecast = forecaster.forecast(1.0, *range).precision.unwrap() / metres;
-            [sums.2 / sums.0, forecast * forecast]
+            [sums.squares_if_moved(shift) / sums.0, forecast * forecast]
         })
         .collect();
     assert!(pairs.len() >= 8, "{}: points at {} ranges", design.name, pairs.len());
@@ -201,7 +213,7 @@ fn against_forecast(design: &Design, environment: &str, of_range: &[Sums]) -> f6
 }
 
 /// H0: where two shots in three to nineteen in twenty are seen, of two sensors one in three, too, the mean
-/// error is no more than a tenth of a tick. N = 25 000 to 34 000 shots at 45 and at 101 m, seed 1; rejected
+/// error is no more than a tenth of a tick. N = 8000 to 12 000 shots at 45 and at 101 m, seed 1; rejected
 /// at 4.5 standard errors beyond. Control: with a fifth of a tick more or less they are rejected.
 ///
 /// FIXME: of coded-360 what is seen once in three shots is 0.11 to 0.12 ticks too near.
@@ -216,7 +228,7 @@ fn what_is_just_seen_is_neither_nearer_nor_farther() {
     ] {
         let design = Design::open(name, &[]).unwrap();
         let forecaster = Forecaster::new(&design, &Environment::default()).unwrap();
-        let part: Vec<Band> = short_bands(&design, 0).step_by(12).collect();
+        let part: Vec<Band> = short_bands(&design, 0).step_by(36).collect();
         for (range, wanted) in [44.5155, 100.9695]
             .iter()
             .flat_map(|range| all_wanted.iter().map(move |pd| (*range, *pd)))
@@ -224,7 +236,7 @@ fn what_is_just_seen_is_neither_nearer_nor_farther() {
             let paint = reflectance(&forecaster, wanted, range);
             let sums = errors_of_paint(&design, &part, (paint, range));
             let at = format!("{name}, Pd {wanted} at {range} m: {:+.3} ticks", sums.mean());
-            assert!(sums.0 > 4000.0, "{at}, {} points", sums.0);
+            assert!(sums.0 > 1300.0, "{at}, {} points", sums.0);
             assert!(sums.excess() <= 4.5, "{at}");
             let control = [-0.2, 0.2].map(|shift| sums.excess_if_moved(shift));
             assert!(control.iter().any(|excess| *excess > 4.5), "{at}: no power");
