@@ -154,7 +154,7 @@ def main():
             else:
                 used, most, before = map(float, done.stdout.split())
                 lines[-1] += (f" Embree's build of them alone: {used:.1f} s, {most / 1000:.0f} MB at most, "
-                              f"of which {before / 1000:.0f} MB before it began.")
+                              f"{before / 1000:.0f} MB before it began.")
     soak.report("load.py", lines, arguments.keep)
 
 

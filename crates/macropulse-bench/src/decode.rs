@@ -62,8 +62,8 @@ impl Decoding {
         let tables: Vec<String> = SCENES.iter().zip(&self.0).map(table).collect();
         let echoes = self.0.iter().map(|cells| grouped(cells[0].score.echoes as f64));
         format!(
-            "Speed; the shots right to 1.5 mm, in per cent of those with an echo; and the returns \
-             more than 0.35 m from every surface of their shot, out of a sample with {} echoes.\
+            "Each entry has the speed, the shots right to 1.5 mm in per cent of those with an echo, \
+             and the returns more than 0.35 m from every surface. The samples have {} echoes.\
              \n\n{}",
             echoes.collect::<Vec<_>>().join(", "),
             tables.join("\n")

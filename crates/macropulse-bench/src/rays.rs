@@ -302,7 +302,7 @@ impl Rays {
         format!(
             "Millions of rays per second.{}\n\n{rays}\nTo load the same STL file and build what \
              rays are cast against; most memory of the program that does.\n\n{loads}\n\
-             Of {} million rays from inside a closed sphere of 360 000 triangles {closed} get out; \
+             From inside a closed sphere of 360 000 triangles, {closed} of {} million rays get out; \
              with one triangle missing, {open}.",
             lacking,
             LEAKED_OF / 1_000_000

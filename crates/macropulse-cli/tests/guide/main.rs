@@ -84,20 +84,11 @@ fn every_page_is_tried() {
     assert_eq!(tried, there);
 }
 
-/// Pages that are not in plain English throughout. Commands write parts of some.
-const NOT_PLAIN: &[&str] = &[
-    "docs/hardening.md",
-    "docs/paper.md",
-    "docs/performance.md",
-    "docs/physics.md",
-    "docs/validation.md",
-];
-
 #[test]
 fn pages_are_in_plain_english() {
     let mut faults = Vec::new();
     let more = ["ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md"];
-    for page in PAGES.iter().chain(&more).filter(|page| !NOT_PLAIN.contains(page)) {
+    for page in PAGES.iter().chain(&more) {
         let text = fs::read_to_string(root().join(page)).unwrap();
         faults.extend(prose::faults(&text).iter().map(|fault| format!("{page}: {fault}")));
     }

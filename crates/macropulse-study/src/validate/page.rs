@@ -4,30 +4,30 @@ use super::published::Within;
 use super::{Figure, Findings, Place, SHOTS};
 use crate::view::{Align, Cell, Page, Section, Table, Verdict};
 
-const LEAD: &str = "What others have published beside what Macropulse says, and what it forecasts \
-                    beside what it simulates. Sources are those of the references; computed apart is \
-                    what others worked out from the same definitions, sharing no code. A figure may \
-                    differ by its rounding, by what its source allows, or by three standard \
-                    deviations where it was drawn.";
+const LEAD: &str = "This page compares published figures with those of Macropulse, and its \
+                    forecasts with its simulations. Sources are those of the references; a figure \
+                    that was computed apart comes from the same definitions, and shares no code. A \
+                    figure may differ by its rounding, by the tolerance of its source, or by three \
+                    standard deviations if it was drawn.";
 
 /// What stands above the forecasts.
 fn of_forecasts(findings: &Findings) -> String {
     format!(
-        "A wall stands all around a ready sensor by night, square on, at 70 % of its range, of \
-         such a reflectance that one shot in ten, half of them, four in five, and nearly all \
-         should be seen; at up to four places within a tick, a part of the shots at each. N is \
-         {SHOTS} shots or a few more, as many as a scan has where that is less; seed {}. Seen \
-         are returns within 0.35 m; standard deviations three of which are more are not compared. \
-         A forecast holds if the share is right within 0.02, three standard deviations or 2 % of \
-         the light; the standard deviation of the range about the peak within 20 %; and the share \
-         of points on a sidelobe of their own macropulse within 0.2 % of them or three standard \
-         deviations. Those are farther than six forecast standard deviations from the truth, and \
-         more than is called right. The matched receivers are thorough: quick ones, as the ready \
-         sensors have them, look where light is likely, and find fewer where it is faint. What \
-         forecasts leave out so far: pulses which only just cross a threshold are told later or \
-         earlier than others, and fall beside the places where they are looked for. There is no \
-         forecast of sidelobes where the first points, which have no neighbours, may lie on one \
-         and mislead others.",
+        "A wall stands all around a ready sensor by night, square on, at 70 % of its range. Its \
+         reflectance is such that one shot in ten, half of them, four in five, and nearly all \
+         should be seen. It stands at up to four places within a tick, with a part of the shots at \
+         each. N is {SHOTS} shots or a few more, or the shots of a scan if they are fewer; seed \
+         {}. A shot is seen if it has a return within 0.35 m. Standard deviations are not compared \
+         if three of them are more. A forecast of the share that is seen holds within 0.02, three \
+         standard deviations or 2 % of the light. The standard deviation of the range about the \
+         peak holds within 20 %. The share of points on a sidelobe of their own macropulse holds \
+         within 0.2 % of them or three standard deviations. Those points are farther than six \
+         forecast standard deviations from the truth, and farther than a right point may be. The \
+         matched receivers are thorough. The quick ones of the ready sensors look where light is \
+         likely, and find less faint light. Forecasts leave out that pulses which only just cross \
+         a threshold are timed later or earlier than others, so that the receiver looks beside \
+         them. There is no forecast of sidelobes if the first points, which have no neighbours, \
+         may lie on one and mislead others.",
         findings.seed
     )
 }
@@ -146,7 +146,7 @@ fn capitalised(text: &str) -> String {
 fn summary(findings: &Findings) -> String {
     let (figures, forecasts) = (findings.published.len(), findings.forecasts.len());
     format!(
-        "Of {figures} published figures {} are met; of {forecasts} forecasts {} hold.",
+        "{} of {figures} published figures are met, and {} of {forecasts} forecasts hold.",
         figures - findings.figures_that_fail(),
         forecasts - findings.forecasts_that_fail()
     )
