@@ -66,7 +66,7 @@ fn walls_are_found_as_forecast() {
     }
 }
 
-/// Whether walls at these ranges, m, and of these reflectances are found as forecast, all together.
+/// Asserts that walls at these ranges, m, and with these reflectances are found as forecast, all together.
 fn found_as_forecast((window, down): (&str, &str), places: &[(f64, f64)], motion: &str) {
     let environment = Environment::named("clear-day").unwrap();
     let set = [("spectrum.window", window), ("chirp.down_us", down), ("receiver.returns", "1")];
@@ -119,7 +119,7 @@ fn radial_velocities_are_measured() {
     assert_eq!(cloud.radial_velocity.len(), cloud.returns());
 }
 
-/// Where a band meets nothing, its false returns have no true velocity, and the columns are as long as the others. A tenth of
+/// If a band meets nothing, its false returns have no true velocity, and all columns have the same length. A tenth of
 /// all shots is false.
 #[test]
 fn false_returns_have_no_true_velocity() {
@@ -143,7 +143,7 @@ fn false_returns_have_no_true_velocity() {
     assert!(counts[0] > 300 && counts[1] > 50, "{counts:?}");
 }
 
-/// Of a single ramp, the speed is taken for range: 15 m/s is 19.354 MHz, and with 128 MHz/µs 22.67 m.
+/// A single ramp takes speed for range: 15 m/s is 19.354 MHz, and with 128 MHz/µs 22.67 m.
 #[test]
 fn a_single_ramp_is_wrong_where_something_moves() {
     let design = sensor(&[("chirp.down_us", "0.0")]);
@@ -168,7 +168,7 @@ fn sunlight_brings_next_to_nothing_to_a_mode() {
     assert!((per_mode / 6.5e-6 - 1.0).abs() < 0.02, "{per_mode}");
 }
 
-/// What a forecast does not model it refuses, and what is wrong in a file is one sentence with its key.
+/// A forecast refuses effects that it does not model, and a fault in a file is told in one sentence with its key.
 #[test]
 fn what_does_not_go_together_is_refused() {
     let straying = sensor(&[

@@ -7,7 +7,7 @@ pub enum Error {
     /// The order of a prime code is composite, or below 3.
     #[error("{p} is not an odd prime; {nearest}")]
     NotOddPrime {
-        /// What was asked for.
+        /// The requested value.
         p: u32,
         /// The odd primes next to it, as the end of the sentence.
         nearest: String,
@@ -17,7 +17,7 @@ pub enum Error {
     PrimeTooLarge {
         /// Which code, with its article.
         code: &'static str,
-        /// What was asked for.
+        /// The requested value.
         p: u32,
         /// The largest prime whose words fit.
         largest: u32,
@@ -27,7 +27,7 @@ pub enum Error {
     Degree {
         /// Which code, with its article.
         code: &'static str,
-        /// What was asked for.
+        /// The requested value.
         degree: u32,
         /// The degrees there are, as the end of the sentence.
         possible: &'static str,
@@ -35,7 +35,7 @@ pub enum Error {
     /// A word without chips, or with chips that have no 16-bit index.
     #[error("a code word of {length} chips is not possible; use 1 to 65535")]
     WordLength {
-        /// What was asked for.
+        /// The requested value.
         length: u32,
     },
     /// A word without marks, or with more marks than chips.
@@ -64,7 +64,7 @@ pub enum Error {
     /// More words than have an index, or none.
     #[error("a family of {words} words is not possible; use 1 to {possible}")]
     Words {
-        /// What was asked for.
+        /// The requested value.
         words: u32,
         /// Most words of a family.
         possible: u32,
@@ -74,12 +74,12 @@ pub enum Error {
         "words that follow each other for later = {later} words are not possible; use 0 to {possible}"
     )]
     Later {
-        /// What was asked for.
+        /// The requested value.
         later: u32,
         /// Most words behind each other.
         possible: u32,
     },
-    /// There are not so many orthogonal words, whoever looks for them.
+    /// That number of orthogonal words does not exist.
     #[error(
         "{words} words of {weight} marks in {length} chips cannot be orthogonal; there are {bound} \
          at most (Johnson bound): use longer words or fewer marks"
@@ -94,7 +94,7 @@ pub enum Error {
         /// ⌊(n − 1)/(w·(w − 1))⌋
         bound: u32,
     },
-    /// There may be so many orthogonal words, but the search does not find them.
+    /// The search does not find that number of orthogonal words, though they may exist.
     #[error(
         "the search finds {found} of {words} orthogonal words of {weight} marks in {length} chips: \
          ask for fewer, or use longer words or fewer marks"
@@ -109,7 +109,7 @@ pub enum Error {
         /// Words found.
         found: u32,
     },
-    /// There is no room, as far as a search finds, for so many distances between marks.
+    /// The search finds no room for that number of distances between marks.
     #[error(
         "the search finds {found} of {words} words of {weight} marks in {length} chips of which all \
          distances are {gap} chips or more and {apart} apart: ask for fewer, longer or nearer ones"
@@ -175,13 +175,13 @@ pub enum Error {
     /// A label must have between 1 and 16 bits.
     #[error("a label of {bits} bits is not possible; use 1 to 16 bits")]
     LabelBits {
-        /// What was asked for.
+        /// The requested value.
         bits: u32,
     },
     /// A checksum must have between 1 and 8 bits.
     #[error("a CRC of {width} bits is not possible; use 1 to 8 bits")]
     CrcWidth {
-        /// What was asked for.
+        /// The requested value.
         width: u8,
     },
     /// The polynomial or the initial value does not fit the width of the checksum.
@@ -189,7 +189,7 @@ pub enum Error {
     CrcTooWide {
         /// `polynomial` or `init`.
         part: &'static str,
-        /// What was asked for.
+        /// The requested value.
         value: u8,
         /// Bits of the checksum.
         width: u8,
@@ -197,13 +197,13 @@ pub enum Error {
     /// A polynomial without the term 1 overlooks errors of a single bit.
     #[error("the CRC polynomial {polynomial:#b} must end in +1: set its lowest bit")]
     CrcWithoutOne {
-        /// What was asked for.
+        /// The requested value.
         polynomial: u8,
     },
     /// A codebook needs at least one label, and no more than the payload can tell apart.
     #[error("{labels} labels are not possible; this payload carries 1 to {possible}")]
     Labels {
-        /// What was asked for.
+        /// The requested value.
         labels: u32,
         /// Labels that have a payload of their own.
         possible: u32,

@@ -21,8 +21,8 @@ pub use sparse::Sparse;
 /// A set of code words. A family that exists is valid.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Family {
-    /// Prime sequence code over GF(p): `p` words of length p² and weight p, any two of which
-    /// coincide in at most 2 marks at any lag \[KP16 §2.2\]. Made by [`Family::prime`].
+    /// Prime sequence code over GF(p): `p` words of length p² and weight p. Any two coincide in at most 2 marks at any
+    /// lag \[KP16 §2.2\]. Made by [`Family::prime`].
     #[non_exhaustive]
     Prime {
         /// Order of the field, an odd prime up to 251.
@@ -64,12 +64,12 @@ pub enum Family {
     /// Marks drawn at random for each word. Made by [`Family::sparse`].
     #[non_exhaustive]
     Sparse(Sparse),
-    /// Words of which all distances between marks differ. Made by [`Family::separated`].
+    /// Words whose distances between marks all differ. Made by [`Family::separated`].
     #[non_exhaustive]
     Separated {
-        /// What was asked for.
+        /// The request.
         asked: Separated,
-        /// What was found.
+        /// The result of the search.
         words: Arc<[CodeWord]>,
     },
     /// Words written out. Made by [`Family::listed`].
@@ -132,12 +132,12 @@ impl Family {
             .map(|p| Self::ExtendedQuadraticCongruence { p })
     }
 
-    /// An optical orthogonal code of `words` words, or of as many as a search finds: that is
-    /// [`Family::count`], and seldom as many as the Johnson bound ⌊(n − 1)/(w·(w − 1))⌋ allows.
+    /// An optical orthogonal code of `words` words, or of all that a search finds. Their number is [`Family::count`],
+    /// and seldom reaches the Johnson bound ⌊(n − 1)/(w·(w − 1))⌋.
     ///
     /// # Errors
-    /// Where the bound allows fewer words, or the search does not find so many, or none; where
-    /// `length` is not 1 to 65535 or `weight` not 1 to `length`.
+    /// If the bound allows fewer words, or the search finds fewer, or none; if `length` is not 1 to 65535 or `weight`
+    /// not 1 to `length`.
     pub fn orthogonal(length: u32, weight: u32, words: Option<u32>) -> Result<Self, Error> {
         let words = orthogonal::found(length, weight, words)?;
         Ok(Self::Orthogonal { length, weight, words })
@@ -153,12 +153,12 @@ impl Family {
         Ok(Self::Sparse(sparse))
     }
 
-    /// Words of which all distances between marks differ: any two words, and a word and itself shifted, meet
-    /// in one mark at most.
+    /// Words whose distances between marks all differ: any two words, and a word and itself shifted, meet in one mark
+    /// at most.
     ///
     /// # Errors
-    /// Where the length is not 1 to 65535, the weight not 1 to 64, the number of words not 1 to 4096, or
-    /// a search finds fewer.
+    /// If the length is not 1 to 65535, the weight not 1 to 64, the number of words not 1 to 4096, or a search finds
+    /// fewer.
     pub fn separated(separated: Separated) -> Result<Self, Error> {
         let words = separated::found(&separated)?.into();
         Ok(Self::Separated { asked: separated, words })
@@ -286,7 +286,7 @@ impl fmt::Display for Family {
     }
 }
 
-/// That a word may have so many chips, and so many marks in them.
+/// Checks the length of a word and its number of marks.
 fn checked_length(length: u32, weight: u32) -> Result<(), Error> {
     if !(1..=u32::from(u16::MAX)).contains(&length) {
         return Err(Error::WordLength { length });

@@ -52,7 +52,7 @@ pub(super) fn decode(
     returns
 }
 
-/// Where a macropulse begins, and what is lit there.
+/// The tick at which a macropulse begins, and its balance there.
 type Peak = (i64, Balance);
 
 struct Band<'a> {
@@ -157,7 +157,7 @@ impl<'a> Band<'a> {
         }
     }
 
-    /// Whether chance would not leave so much of `peak`, the best of `shot`, which has so many marks.
+    /// True if chance does not explain `peak`, the best one of `shot`, which has `marks` marks.
     fn is_believed(&mut self, shot: usize, marks: u16, peak: Balance) -> bool {
         let (nearest, farthest) = self.gate;
         let gate = self.fired[shot] + nearest..self.fired[shot] + farthest + 1;
@@ -368,10 +368,10 @@ mod tests {
         }
     }
 
-    /// H0: of gates with light in step, none of which is the shot's own, no more are believed than are
-    /// accepted, one in a hundred. N = 6000 gates, seed 6: 85 or more come with α = 0.0014 (Poisson, mean 60).
-    /// In runs of 50 chips nothing is lit, or a share of 0.1 to 0.6 of the places that are whole chips apart.
-    /// Control: by the mean density of the gate more than one in ten would be believed.
+    /// H0: in gates with light in step, none of it the shot's own, returns are believed at the accepted rate, one in a
+    /// hundred. N = 6000 gates, seed 6: 85 or more come with α = 0.0014 (Poisson, mean 60). Runs of 50 chips are dark,
+    /// or lit at a share of 0.1 to 0.6 of the places that are whole chips apart. Control: by the mean density of the
+    /// gate more than one in ten would be believed.
     #[test]
     fn light_in_step_is_believed_no_more_often_than_is_accepted() {
         let book = &books()[1];

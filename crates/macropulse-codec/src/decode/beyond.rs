@@ -1,12 +1,11 @@
 //! Light from beyond the gate that passes for an echo within it.
 //!
-//! Code words repeat after some shots. An echo from beyond the gate, of an earlier shot in the same
-//! word, arrives while a later one is listened to; where both payloads have bits in common, it
-//! looks like a faint echo of the later shot. The receiver knows what it has sent, and holds the
-//! two against each other at the same place, or whole bits beside it. Some marks both have; of
-//! these a share c is lit. Of the marks that only one of them has, a share c is lit if the light is
-//! of that one, and the share d of all places that are lit anyway if it is of the other. The return
-//! is given up where the light is of the earlier shot with odds of [`ODDS`] to one.
+//! Code words repeat after some shots. An echo from beyond the gate, of an earlier shot in the same word, arrives in
+//! the gate of a later one. If both payloads have bits in common, it looks like a faint echo of the later shot. The
+//! receiver knows both macropulses, and compares them at the same place, or whole bits beside it. A share c of the
+//! marks that both have is lit. Marks that only one of them has are lit with the share c if the light is of that one.
+//! If it is of the other, they are lit with the share d of all lit places. The return is given up if the light is of
+//! the earlier shot with odds of [`ODDS`] to one.
 
 use std::cell::Cell;
 use std::ops::Range;
@@ -16,7 +15,7 @@ use super::{Correlation, Receiver, Reject, Return, Returns};
 use crate::code::Codebook;
 use crate::{ShotLog, Ticks};
 
-/// One return in so many that is held against an earlier shot may be given up wrongly.
+/// One in this number of returns that are compared with an earlier shot may be given up wrongly.
 const ODDS: f64 = 1000.0;
 
 thread_local! {
@@ -42,7 +41,7 @@ pub(super) fn exclude(
     let slack = 1 + (2.0 * correlation.jitter()).ceil() as u32;
     let width = 2 * slack + 1;
     let length = i64::from(codebook.chips() * correlation.ticks_per_chip);
-    // What is asked of a return: its macropulse, and as much to both sides.
+    // The span to examine for a return: its macropulse, and the same length to both sides.
     let (nearest, farthest) = receiver.gate_ticks;
     let light = |fired: i64| {
         fired + i64::from(nearest) - 2 * length..fired + i64::from(farthest) + 3 * length
@@ -50,7 +49,7 @@ pub(super) fn exclude(
     let first = light(fired[returns.shot[0] as usize]);
     let extent = (first.start, first.end - first.start);
     let field = Field::new(&ticks.tick, width, extent, length, MEMORY.take());
-    // At most so many are lit: neighbours overlap.
+    // An upper bound of the lit places, as neighbours overlap.
     let lit = ticks.tick.len() as f64 * f64::from(width);
     let ends = ticks.tick.last().zip(ticks.tick.first());
     let lasts = 1.0 + ends.map_or(0.0, |(last, first)| f64::from(last - first));
@@ -72,7 +71,7 @@ pub(super) fn exclude(
     MEMORY.set(bench.field.into_memory());
 }
 
-/// What a return is held against.
+/// The data that a return is compared with.
 struct Bench<'a> {
     receiver: &'a Receiver,
     correlation: &'a Correlation,
@@ -80,7 +79,7 @@ struct Bench<'a> {
     log: &'a ShotLog,
     /// Tick in which each shot was fired, from the epoch on.
     fired: Vec<i64>,
-    /// A place is lit if light came so many ticks behind it, or so many about that.
+    /// A place is lit if light came this number of ticks behind it, or near that.
     field: Field<'a>,
     slack: u32,
     /// Share of the ticks that are.
@@ -88,8 +87,8 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    /// Whether an earlier shot, with an echo from beyond the gate, accounts for the light of `one`
-    /// better than the shot it was taken for.
+    /// True if an earlier shot, with an echo from beyond the gate, explains the light of `one` better than its own shot
+    /// does.
     fn is_of_an_earlier_shot(&self, one: &Return) -> bool {
         let lag = (one.tof * 1e15 / self.receiver.tick_fs as f64) as i64;
         let arrives = self.fired[one.shot] + lag;
@@ -108,8 +107,8 @@ impl Bench<'_> {
         })
     }
 
-    /// Whether the first bit of `shot`, begun at tick `begins`, is lit at least half as much as the
-    /// marks of `one` are. Nearly every shot is refused here.
+    /// True if the first bit of `shot`, begun at tick `begins`, is lit at least half as well as the marks of `one`.
+    /// Nearly every shot is refused here.
     fn begins_like(&self, shot: usize, begins: i64, one: &Return) -> bool {
         let first = self.first_bit(shot);
         let scale = i64::from(self.correlation.ticks_per_chip);
@@ -125,14 +124,14 @@ impl Bench<'_> {
         &marks[..marks.partition_point(|mark| bit(mark) == bit(&marks[0]))]
     }
 
-    /// Whether light is rather of the `earlier` macropulse than of the `later` one.
+    /// True if the light is more likely of the `earlier` macropulse than of the `later` one.
     fn is_rather(&self, earlier: Sent, later: Sent) -> bool {
         let [both, of_earlier, of_later] = self.compared(earlier, later);
         let lit = (both.lit as f64 + 0.5) / (both.all as f64 + 1.0);
         if lit <= self.density {
             return false;
         }
-        // What each mark says in favour of a macropulse that has it: ln(c/d), or ln((1 − c)/(1 − d)).
+        // Evidence of each mark for a macropulse that has it: ln(c/d), or ln((1 − c)/(1 − d)).
         let (found, missing) =
             (libm::log(lit / self.density), libm::log((1.0 - lit) / (1.0 - self.density)));
         let speaks =
@@ -163,13 +162,13 @@ impl Bench<'_> {
         ]
     }
 
-    /// Whether light came about tick `place`.
+    /// True if light came about tick `place`.
     fn has(&self, place: i64) -> bool {
         self.field.lit().has(place - i64::from(self.slack))
     }
 
-    /// The shots before `shot`, in the same word, of which light from beyond the gate can arrive
-    /// within `about` ticks of `arrives`.
+    /// The shots before `shot`, in the same word, whose light from beyond the gate can arrive within `about` ticks of
+    /// `arrives`.
     fn earlier(&self, shot: usize, arrives: i64, about: i64) -> impl Iterator<Item = usize> {
         let (_, farthest) = self.receiver.gate_ticks;
         let opened = arrives - about - i64::from(self.correlation.light_ticks);
@@ -191,7 +190,7 @@ struct Marks {
     all: usize,
 }
 
-/// A macropulse: of which shot, and when it begins to arrive, in ticks.
+/// A macropulse: its shot, and the tick at which it begins to arrive.
 #[derive(Clone, Copy)]
 struct Sent {
     shot: usize,

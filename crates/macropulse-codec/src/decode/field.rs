@@ -36,15 +36,15 @@ pub(super) struct Field<'a> {
     picture: Picture,
 }
 
-/// Where marks count as found, one bit for every eight ticks from the beginning on: lit where any of the
-/// sixteen from the first of them on is, so that a mark is met by the bit of its place whichever of eight lags
-/// it comes after. Made where it is looked at.
+/// A picture of the ticks at which marks count as found, with one bit for every eight. A bit is lit if any of the
+/// sixteen ticks from the first of its eight on is lit. So one bit covers a mark at any of eight lags. It is made where
+/// it is looked at.
 #[derive(Debug, Default)]
 pub(super) struct Picture {
     words: Vec<u64>,
     /// Which segments are made.
     made: Vec<bool>,
-    /// Whether any of eight ticks is lit, for the segment that is made.
+    /// Bits that are lit if any of eight ticks is, for the segment that is made.
     fine: Vec<u64>,
 }
 
@@ -75,7 +75,7 @@ impl Picture {
     }
 }
 
-/// Of a cell in which ticks were cancelled since they were counted.
+/// The count of a cell in which ticks were cancelled since.
 const UNKNOWN: u32 = u32::MAX;
 
 /// Memory of a field, whatever is in it.
@@ -123,13 +123,12 @@ impl<'a> Field<'a> {
         ([self.seen, self.lit, self.residual], self.picture)
     }
 
-    /// Where the ticks that are laid down end.
+    /// The end of the ticks that are laid down.
     fn end(&self) -> i64 {
         self.begin + self.cell * (self.before.len() as i64 - 1)
     }
 
-    /// Whether so many `ticks`, one at least, come in a shorter time than `within` anywhere in `span`, be it laid
-    /// down or not.
+    /// True if `ticks` ticks, one at least, come in a shorter time than `within` anywhere in `span`, laid down or not.
     pub fn come_together(&self, ticks: usize, span: &Range<i64>, within: i64) -> bool {
         let before = |end: i64| self.ticks.partition_point(|tick| i64::from(*tick) < end);
         let last = ticks - 1;
@@ -196,7 +195,7 @@ impl<'a> Field<'a> {
         look_ahead(seen, lit, self.width as usize - 1);
     }
 
-    /// Where marks count as found.
+    /// The ticks at which marks count as found.
     pub fn lit(&self) -> &Timeline {
         if self.width == 1 { &self.seen } else { &self.lit }
     }
@@ -216,17 +215,18 @@ impl<'a> Field<'a> {
         &self.seen
     }
 
-    /// Whether there is a tick at `tick` that is not cancelled.
+    /// True if there is a tick at `tick` that is not cancelled.
     pub fn is_left(&self, tick: i64) -> bool {
         self.residual.has(tick)
     }
 
-    /// The ticks of `pattern` that are not cancelled, summed over all of its beginnings: each is so many ticks `after` `start`.
+    /// The number of ticks of `pattern` that are not cancelled, summed over its beginnings, which are `after` ticks
+    /// behind `start`.
     pub fn left_in_all(&self, start: i64, after: &[u32], pattern: &Pattern) -> u32 {
         self.residual.lit_in_all(start, after, pattern)
     }
 
-    /// Cancels the ticks of `pattern`, begun so many ticks `after` `start`, for each of these, ascending.
+    /// Cancels the ticks of `pattern` at each of its beginnings, which are `after` ticks behind `start`, ascending.
     pub fn cancel(&mut self, start: i64, after: &[u32], pattern: &Pattern) {
         self.residual.put_out(start, after, pattern);
         if let (Some(first), Some(last)) = (after.first(), after.last()) {
@@ -236,7 +236,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Where marks count as found by ticks that are not cancelled, for all of `span`. It is made in `memory` if a mark is
+    /// The ticks at which marks count as found in the residual, for all of `span`. It is made in `memory` if a mark is
     /// looked for in several ticks.
     pub fn lit_by_residual<'b>(
         &'b self,
@@ -268,8 +268,8 @@ impl<'a> Field<'a> {
         (ticks, self.cell * (cells.end - cells.start) as i64)
     }
 
-    /// Share of the places about `span` at which a mark counts as found, were its ticks spread evenly,
-    /// without so many ticks and places.
+    /// Share of the places about `span` at which a mark counts as found if its ticks are spread evenly, without `ticks`
+    /// and `places` of them.
     pub fn density_without(&self, span: &Range<i64>, ticks: u32, places: u32) -> f64 {
         let (all, length) = self.ticks_about(span);
         let places = (length - i64::from(places)).max(1) as f64;

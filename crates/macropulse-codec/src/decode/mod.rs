@@ -70,8 +70,7 @@ pub enum Method {
     Bitwise(Bitwise),
     /// Correlates the whole known macropulse of every shot in flight.
     Matched(Correlation, Effort),
-    /// Correlates, and counts what falls on dark chips against the macropulse; for words of which
-    /// about half the chips are lit.
+    /// Correlates, and counts light on dark chips against the macropulse; for words with about half of their chips lit.
     Balanced(Correlation),
     /// Correlates samples: adds up the marks of a word, and takes away what was explained.
     Sampled(Sampled),
@@ -177,8 +176,7 @@ kinds! {
     Blind, Self::Bitwise(Bitwise { opening: Opening::AnyBit, .. }) => "blind", 1;
     /// Correlates the whole known macropulse of every shot in flight.
     Matched, Self::Matched(..) => "matched", matched::MOST_RETURNS;
-    /// As `matched`, but what falls on dark chips counts against it; for words of which about half
-    /// the chips are lit.
+    /// As `matched`, but light on dark chips counts against it; for words with about half of their chips lit.
     Balanced, Self::Balanced(_) => "balanced", 1;
     /// For shots without a code: the ticks in the range gate.
     Direct, Self::Direct => "direct", MOST_RETURNS;
@@ -271,14 +269,14 @@ fn wrong(method: &Method, given: RecordKind) -> Error {
     Error::Record { wants: method.record().name(), given: given.name() }
 }
 
-/// The shots that are fired while light passes the gate so many times are decoded together: so many
-/// more than are in flight that what is looked at twice, at both ends of a block, costs little.
+/// Gates in a block: the shots fired in that time are decoded together. They are enough more than those in flight that
+/// the overlap of blocks, which is looked at twice, costs little.
 const GATES_PER_BLOCK: i64 = 2;
 
 /// Ticks before the first light and behind the last that are looked at, so that a mark may jitter.
 const MARGIN: i64 = 2048;
 
-/// Where in its tick light comes that only one tick tells of.
+/// Place in its tick at which light comes that only one tick shows.
 const MIDDLE: f64 = 0.5;
 
 /// The most jitter that is decoded as such, in ticks: a mark is looked for 2 σ to both sides of its place,
@@ -298,8 +296,8 @@ impl Receiver {
         }
     }
 
-    /// Whether it can decode what is sent with `codebook`. [`Receiver::decode`] asks it first; who makes a
-    /// receiver can ask it before there is anything to decode.
+    /// Checks that it can decode shots sent with `codebook`. [`Receiver::decode`] checks it first. A caller can check
+    /// it before there is anything to decode.
     ///
     /// # Errors
     /// If a setting is outside its limits, or the code words are not understood or too long.
@@ -390,8 +388,7 @@ impl Receiver {
         })
     }
 
-    /// What comes of so many owned shots where it is dark. A receiver that goes from tick to tick
-    /// counts none of them.
+    /// The result for `shots` owned shots in the dark. A receiver that goes from tick to tick counts none of them.
     fn nothing_of(&self, shots: usize) -> Returns {
         let mut returns = Returns::default();
         if !matches!(self.method, Method::Bitwise(_)) {

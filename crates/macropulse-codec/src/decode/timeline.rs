@@ -119,7 +119,7 @@ impl Timeline {
         &mut self.words[places]
     }
 
-    /// Where the machine words of `span` are.
+    /// The machine words of `span`.
     fn places(&self, span: &Range<i64>) -> Range<usize> {
         let word = |tick: i64| (((tick - self.origin) / 64).max(0) as usize).min(self.words.len());
         word(span.start)..word(span.end)
@@ -130,8 +130,8 @@ impl Timeline {
         (&self.words, (tick - self.origin).max(0) as usize)
     }
 
-    /// Darkens the ticks of `pattern`, begun so many ticks `after` `tick`, for each of these, ascending, but
-    /// those that begin before all.
+    /// Darkens the ticks of `pattern` at each of its beginnings, which are `after` ticks behind `tick`, ascending.
+    /// Beginnings before the timeline are left out.
     pub fn put_out(&mut self, tick: i64, after: &[u32], pattern: &Pattern) {
         let (first, after) = self.begun(tick, after);
         put_out(&mut self.words, first, after, pattern);
@@ -143,7 +143,7 @@ impl Timeline {
         self.words_mut(span).iter_mut().zip(lit).for_each(|(word, lit)| *word &= lit);
     }
 
-    /// Whether all ticks of `pattern` are lit if it begins so many ticks `after` `tick`, for each of these,
+    /// True if all ticks of `pattern` are lit at each of its beginnings, which are `after` ticks behind `tick`,
     /// ascending.
     pub fn are_lit(&self, tick: i64, after: &[u32], pattern: &Pattern) -> bool {
         let (first, begun) = self.begun(tick, after);
@@ -156,7 +156,7 @@ impl Timeline {
         light_up(&mut self.words, first, after, pattern);
     }
 
-    /// The bit of `tick`, modulo 2⁶⁴, and those so many ticks `after` it, ascending, that are not before all.
+    /// The bit of `tick`, modulo 2⁶⁴, and those of `after`, ascending, that do not lie before the timeline.
     fn begun<'b>(&self, tick: i64, after: &'b [u32]) -> (usize, &'b [u32]) {
         let first = tick - self.origin;
         if first >= 0 {
@@ -172,7 +172,7 @@ impl Timeline {
         (word < self.words.len()).then_some((word, 1 << (bit & 63)))
     }
 
-    /// Whether `tick` is lit.
+    /// True if `tick` is lit.
     pub fn has(&self, tick: i64) -> bool {
         self.place(tick).is_some_and(|(word, bit)| self.words[word] & bit != 0)
     }
@@ -205,7 +205,7 @@ impl Timeline {
         bit.map_or(0, |bit| lit_in(&self.words, bit, pattern))
     }
 
-    /// The same of it begun so many ticks `after` `tick`, for all of these together.
+    /// The same for all of its beginnings together, which are `after` ticks behind `tick`.
     pub fn lit_in_all(&self, tick: i64, after: &[u32], pattern: &Pattern) -> u32 {
         let first = usize::try_from(tick - self.origin);
         first.map_or(0, |first| lit_in_all(&self.words, first, after, pattern))
@@ -222,13 +222,13 @@ impl Timeline {
         }
     }
 
-    /// How many ticks of `pattern` are lit at one at least of the places so many ticks `after` `tick` where it
-    /// may begin.
+    /// The number of ticks of `pattern` that are lit for at least one of its beginnings, which are `after` ticks behind
+    /// `tick`.
     pub fn lit_in_any(&self, tick: i64, after: &[u32], pattern: &Pattern) -> u32 {
         lit_in_any(&self.words, (tick - self.origin) as usize, after, pattern)
     }
 
-    /// As [`Self::lit_in`] if it begins so many ticks `after` `tick`, for each of these; put into `counts`.
+    /// As [`Self::lit_in`] for each of its beginnings, which are `after` ticks behind `tick`; put into `counts`.
     pub fn lit_in_each(&self, tick: i64, after: &[u32], pattern: &Pattern, counts: &mut Vec<u32>) {
         counts.clear();
         counts.resize(after.len(), 0);

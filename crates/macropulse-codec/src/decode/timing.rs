@@ -45,7 +45,7 @@ const FEWEST_OTHERS: f64 = 1e-3;
 /// place and the jitter is small, they tell nothing of where in it.
 const LEAST_INFORMATION: f64 = 1.0;
 
-/// What the receiver knows about the ticks of a macropulse.
+/// The knowledge of a receiver about the ticks of a macropulse.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Known<'a> {
     /// Standard deviation of the timing of a mark, in ticks; above 0.
@@ -80,10 +80,9 @@ impl Histogram {
     /// Makes it that of a macropulse which is found at the earliest of `width` ticks that hold its marks.
     /// `count` is given a number of ticks and counts to fill in: of those so late, of those one tick later, and so on.
     ///
-    /// They are counted 2 σ and half a tick to both sides of the fullest places, as many to one as to the
-    /// other: a jitter less than is known then draws to neither. Strong light may light places farther
-    /// away: as long as a quarter as many ticks as in the fullest place are in the last ones, more are
-    /// counted.
+    /// They are counted 2 σ and half a tick to both sides of the fullest places, equally far to both: a jitter smaller
+    /// than the known one then draws to neither. Strong light may light places farther away. As long as the last places
+    /// have a quarter of the ticks of the fullest one, more are counted.
     pub fn count(&mut self, width: u32, sigma: f64, count: impl Fn(i64, &mut [u32])) {
         let Self { counts, about, .. } = self;
         let reach = (2.0 * sigma + 0.5).ceil() as usize;
@@ -195,11 +194,12 @@ pub(super) fn neighbours(marks: &[i64], reach: i64) -> Vec<(i64, f64)> {
         .collect()
 }
 
-/// Where most ticks are within ±σ, or in two places side by side: their mean, in the middle of ticks.
+/// The mean of the ticks about the time at which most of them are within ±σ, or in two places side by side; each counts
+/// at its middle.
 ///
-/// Where jitter is small they are on both sides of the end of one tick, with a share s behind it: then
-/// the light is late by that end and σ·Φ⁻¹(s) more. On one side alone they do not tell how far from
-/// its end they are, and the middle of the tick is as good as any place.
+/// If jitter is small, they are on both sides of the end of one tick, with a share s behind it: then the light is late
+/// by that end and σ·Φ⁻¹(s) more. If they are on one side alone, their distance from the end is unknown, and the middle
+/// of the tick is a fair place.
 fn fullest(counts: &[u32], first: i64, known: &Known) -> f64 {
     let together = (2 + 2 * known.sigma.round() as usize).min(counts.len().max(1));
     let sum = |window: &[u32]| window.iter().map(|count| u64::from(*count)).sum::<u64>();
@@ -221,8 +221,8 @@ fn fullest(counts: &[u32], first: i64, known: &Known) -> f64 {
     begin + moment as f64 / sum(window).max(1) as f64 + 0.5
 }
 
-/// Ticks of a mark and of its neighbours expected in each place, the first of which begins so many
-/// ticks after the light of the mark, Σ_D a_D·P; and by how much more of its own if it is later.
+/// Ticks of a mark and of its neighbours expected in each place, Σ_D a_D·P, and the derivative of its own with its
+/// delay. The first place begins `begins` ticks after the light of the mark.
 fn expect(expected: &mut [(f64, f64)], begins: f64, known: &Known) {
     expected.fill((0.0, 0.0));
     let of_mark = std::iter::once((0, 1.0));
@@ -300,7 +300,7 @@ mod tests {
         }
     }
 
-    /// What light is like.
+    /// Properties of light.
     #[derive(Debug, Clone, Copy)]
     struct Sky {
         sigma: f64,
@@ -341,8 +341,8 @@ mod tests {
         (histogram, width as u32)
     }
 
-    /// The mean error of so many macropulses of `marks`, and its standard error, at each of ten
-    /// phases of a tick; by the estimator, and by the mean of all ticks counted.
+    /// The mean error of macropulses of `marks`, and its standard error, at each of ten phases of a tick; by the
+    /// estimator, and by the mean of all ticks counted.
     fn errors(marks: &[i64], sky: Sky, seed: u64) -> Vec<[(f64, f64); 2]> {
         const MACROPULSES: usize = 400;
         let mut chance = Chance(ChaCha8Rng::seed_from_u64(seed));

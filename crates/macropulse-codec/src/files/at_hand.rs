@@ -1,4 +1,4 @@
-//! What of a record is at hand: as much as belongs to what is decoded together.
+//! The part of a record that is in memory: the shots that are decoded together, and their data.
 
 use std::collections::VecDeque;
 use std::io::Read;
@@ -48,7 +48,7 @@ impl<R: Read> AtHand<R> {
         }
     }
 
-    /// Whether it has a record for each shot, and no other.
+    /// True if it has a record for each shot, and no other.
     pub fn is_by_shot(&self) -> bool {
         matches!(self, Self::Histograms(_) | Self::Taps(_) | Self::Beats(_))
     }
@@ -170,7 +170,7 @@ impl<R: Read> EachShot<BeatReader<R>, Vec<Peak>> {
 #[derive(Debug)]
 pub(super) struct TicksAtHand<R> {
     reader: TickReader<R>,
-    /// Whether the receiver is given the channel of each tick.
+    /// True if the receiver is given the channel of each tick.
     several: bool,
     seen: Vec<Tick>,
     is_over: bool,

@@ -75,7 +75,7 @@ impl<R: Read> BeatReader<R> {
         Ok(Self { records, header })
     }
 
-    /// What is said before the beats.
+    /// The header, before the beats.
     pub fn header(&self) -> &BeatHeader {
         &self.header
     }
@@ -107,7 +107,7 @@ pub struct BeatWriter<W> {
 }
 
 impl<W: Write> BeatWriter<W> {
-    /// Writes the header; the peaks of as many shots are to come as it says, if it does.
+    /// Writes the header. If it states a number of shots, the caller writes the peaks of that many.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -128,7 +128,7 @@ impl<W: Write> BeatWriter<W> {
         Self { out, bytes: Vec::new() }
     }
 
-    /// Writes `beats`, the first of which are those of the shot with the absolute id `first`.
+    /// Writes `beats`, beginning with those of the shot with the absolute id `first`.
     ///
     /// # Errors
     /// If they cannot be written.

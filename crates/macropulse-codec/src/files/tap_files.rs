@@ -66,7 +66,7 @@ impl<R: Read> TapReader<R> {
         Ok(Self { records, header })
     }
 
-    /// What is said before the taps.
+    /// The header, before the taps.
     pub fn header(&self) -> &TapHeader {
         &self.header
     }
@@ -96,7 +96,7 @@ pub struct TapWriter<W> {
 }
 
 impl<W: Write> TapWriter<W> {
-    /// Writes the header; the taps of as many shots are to come as it says, if it does.
+    /// Writes the header. If it states a number of shots, the caller writes the taps of that many.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -116,7 +116,7 @@ impl<W: Write> TapWriter<W> {
         Self { out, bytes: Vec::new() }
     }
 
-    /// Writes `taps`, the first of which are those of the shot with the absolute id `first`.
+    /// Writes `taps`, beginning with those of the shot with the absolute id `first`.
     ///
     /// # Errors
     /// If they cannot be written.

@@ -65,7 +65,7 @@ impl Chirp {
         self.ramps().iter().map(|ramp| ramp.seconds / length).collect()
     }
 
-    /// Whether the phase of its light is that of an ideal chirp.
+    /// True if the phase of its light is that of an ideal chirp.
     pub fn is_ideal(&self) -> bool {
         self.linewidth == 0.0 && self.error.amplitude == 0.0
     }
@@ -150,7 +150,7 @@ pub(super) struct ChirpFile {
 }
 
 impl ChirpFile {
-    /// Whether it has no falling ramp.
+    /// True if it has no falling ramp.
     pub(super) fn is_single(&self) -> bool {
         self.down_us == Some(0.0)
     }

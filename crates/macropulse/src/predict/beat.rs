@@ -34,12 +34,12 @@ const PHOTONS: (f64, f64) = (-3.0, 9.0);
 pub(super) struct Beats {
     coherent: Coherent,
     false_alarm: f64,
-    /// Of every number of photons of a ramp, e to the steps of [`FINE`]: the probability of a return, and the mean power of
-    /// those of all ramps together.
+    /// For each number of photons in a ramp, e to the steps of [`FINE`]: the probability of a return, and the mean
+    /// power of such returns over all ramps.
     found: Vec<Found>,
 }
 
-/// What becomes of so many photons.
+/// The chances of an echo with a number of photons.
 #[derive(Debug, Clone, Copy)]
 struct Found {
     photons: f64,
@@ -49,7 +49,7 @@ struct Found {
 }
 
 impl Beats {
-    /// Of a sensor of frequency-modulated light; `None` of others.
+    /// The forecast for a sensor of frequency-modulated light; `None` for others.
     pub fn of(design: &Design, method: &BeatMethod) -> Option<Self> {
         let Detector::Coherent(coherent) = &design.detector else { return None };
         let threshold = method.threshold(design.receiver.gate_fs());
@@ -100,8 +100,8 @@ impl Beats {
         self.false_alarm
     }
 
-    /// What is found at `range` metres of so many detected photons of a shot, where `background` photons of sunlight are
-    /// detected per second.
+    /// The chances of an echo at `range` metres with `photons` detected in a shot, while `background` photons of
+    /// sunlight are detected per second.
     pub fn chances(&self, range: f64, photons: f64, background: f64) -> Chances {
         let Coherent { chirp, .. } = &self.coherent;
         let tof = tof_from_range(range);
@@ -144,8 +144,8 @@ fn between(tails: &[Vec<f64>], logarithm: f64) -> Vec<f64> {
     tails[at].iter().zip(next).map(|(one, next)| one + share * (next - one)).collect()
 }
 
-/// The probability that one of two powers exceeds a third, each of which does with these probabilities; so far `alike` that
-/// 0 stands for independent ones and 1 for equal ones.
+/// The probability that one of two powers exceeds a threshold, from the probability for each. They are independent if
+/// `alike` is 0, and equal if it is 1.
 fn either([one, other]: [f64; 2], alike: f64) -> f64 {
     let both = one * other;
     one + other - both - alike * (one.min(other) - both)

@@ -79,7 +79,7 @@ pub struct BeatReceiver {
     pub method: BeatMethod,
 }
 
-/// What peaks of all ramps say together.
+/// The measurement that peaks of all ramps make together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate {
     /// Two-way time of flight, s.
@@ -171,8 +171,8 @@ impl BeatReceiver {
     }
 }
 
-/// What the `peaks` of a shot may be of, ramp by ramp, the strongest first: every peak of a ramp with every one of the
-/// other. `threshold` is the power from which on two of them are a return.
+/// The possible measurements from the `peaks` of a shot, which are listed ramp by ramp. Every peak of a ramp is paired
+/// with every one of the other, and the strongest pair comes first. A pair is a return if its power reaches `threshold`.
 pub fn candidates(receiver: &BeatReceiver, threshold: f64, peaks: &[Peak]) -> Vec<Candidate> {
     let method = &receiver.method;
     let each = peaks.len() / method.ramps.len().max(1);
@@ -260,7 +260,7 @@ impl BeatMethod {
         high
     }
 
-    /// What a peak of a single ramp says: the Doppler shift is taken for none.
+    /// The measurement from a peak of a single ramp, without any Doppler shift.
     fn of_one(&self, ramp: &Ramp, at: usize, peak: Peak) -> Candidate {
         Candidate {
             tof: peak.bins() / ramp.bandwidth.abs(),
@@ -272,7 +272,7 @@ impl BeatMethod {
         }
     }
 
-    /// What two peaks say, one of each ramp.
+    /// The measurement from two peaks, one of each ramp.
     fn of_two(&self, ramps: [Ramp; 2], at: [usize; 2], peaks: [Peak; 2]) -> Candidate {
         let hz = [0, 1].map(|ramp| peaks[ramp].bins() / ramps[ramp].seconds);
         // Each ramp says slope·tof − sign·doppler: their difference, by the signs, is without Doppler shift.

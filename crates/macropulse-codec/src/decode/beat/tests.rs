@@ -100,8 +100,8 @@ fn ramps_need_not_be_equal() {
     assert_relative_eq!(returns.radial_velocity[0], -21.0, max_relative = 1e-5);
 }
 
-/// Of two surfaces the strong peaks belong together, and the faint ones; what is outside the gate, too fast, or faint,
-/// is no return, and says so.
+/// With two surfaces the strong peaks belong together, and the faint ones do. A pair that is outside the gate, too
+/// fast, or faint is no return, and gives its reason.
 #[test]
 fn peaks_are_paired_by_their_powers() {
     let receiver = receiver(method());
@@ -133,8 +133,8 @@ fn peaks_are_paired_by_their_powers() {
     }
 }
 
-/// H0: as many false returns as accepted, one in ten shots, of spectra that hold noise alone. All bins of both ramps
-/// are drawn, N = 20 000 shots, seed 5; α = 1e-6 (|z| < 4.9). Control: half the rate is noticed.
+/// H0: spectra of noise alone make false returns at the accepted rate, one in ten shots. All bins of both ramps are
+/// drawn, N = 20 000 shots, seed 5; α = 1e-6 (|z| < 4.9). Control: half the rate is noticed.
 #[test]
 fn noise_makes_the_false_returns_that_are_accepted() {
     let mut method = BeatMethod { false_alarm: 0.1, max_speed: 10.0, least_power: 3.0, ..method() };

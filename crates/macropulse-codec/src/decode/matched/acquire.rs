@@ -1,15 +1,13 @@
-//! Acquisition: the exact maximum over the gate, and where light is left over at all.
+//! Acquisition: the exact maximum over the gate, and the places where light is left over.
 //!
-//! Coarse pictures of the timeline, one bit for eight ticks, bound the count of marks from above for
-//! eight lags at once: a mark that is lit is lit in the picture. There are eight pictures, each a
-//! tick later, so that a mark of any place is met by exactly the eight ticks it may fall on. Only
-//! where the bound is high enough are the lags counted one by one. What is skipped cannot be the
-//! maximum.
+//! Coarse pictures of the timeline have one bit for eight ticks. They bound the count of marks from above for eight
+//! lags at once, as a mark that is lit is lit in the picture. There are eight pictures, each a tick later, so that one
+//! bit covers exactly the eight ticks on which a mark may fall. The lags are counted one by one only if the bound is
+//! high enough. A lag that is skipped cannot be the maximum.
 //!
-//! Before that, the pictures are asked for the code word alone: of a macropulse with k marks, one of
-//! its B lit bits has k/B of them at least. This is a fraction of the marks, looked up once for all
-//! bits, and where light is bright it leaves next to nothing to be counted; where chance has as many
-//! nearly everywhere it is not asked.
+//! Before that, the pictures are searched for the code word alone. If a macropulse has k marks, one of its B lit bits
+//! has k/B of them at least. This takes a fraction of the marks, looked up once for all bits. In bright light it leaves
+//! next to nothing to be counted. It is left out if chance gives that number of marks nearly everywhere.
 
 use std::ops::Range;
 
@@ -33,13 +31,13 @@ pub(super) struct Search {
     /// The marks of the macropulse at hand in the pictures, and those of its code word.
     places: Marks,
     word: Marks,
-    /// Where the word may begin in the pictures, from the first lag of a range on.
+    /// Bits of the pictures at which the word may begin, from the first lag of a range on.
     words: Vec<u64>,
     counts: Counts<WIDE>,
     /// Lags that were counted one by one in the last search.
     counted: i64,
     pictures: Pictures,
-    /// Where marks count as found.
+    /// Ticks at which marks count as found.
     lit: Timeline,
 }
 
@@ -51,13 +49,13 @@ struct Marks {
 }
 
 impl Marks {
-    /// Makes them those of so many `ticks`, in pictures of so many bits.
+    /// Sets them to those at the `ticks`, in pictures of `stride` bits each.
     fn set(&mut self, ticks: &[u32], stride: u32) {
         in_pictures(ticks, stride, &mut self.places);
         self.farthest = self.places.iter().copied().max().unwrap_or(0);
     }
 
-    /// Tells from which bits of the `pictures` on, the first one being `first`, so many may be there.
+    /// Finds the bits of the `pictures`, from `first` on, at which `needed` marks may be there.
     fn find(&self, pictures: &Pictures, first: u32, needed: u32, enough: &mut [u64]) {
         let marks = (&*self.places, self.farthest);
         with_enough::<WIDE>(&pictures.words, first, marks, needed, enough);
@@ -77,14 +75,13 @@ struct Pictures {
     made: Vec<bool>,
 }
 
-/// Ticks of a segment: an eighth of the gate of a lidar that sees 100 m at 2.5 ps a tick, in whole machine
-/// words of a picture. Half and four times as many take as long.
+/// Ticks of a segment: an eighth of the gate of a lidar that sees 100 m at 2.5 ps a tick, in whole machine words of a
+/// picture. Half and four times this number take equally long.
 const SEGMENT: i64 = 1 << 15;
 
 impl Pictures {
-    /// Makes those of `span`, where there are none yet. They go on showing ticks that
-    /// are cancelled later, which costs time and nothing else: less than to make them anew after so
-    /// many macropulses as 8, 32, or 128.
+    /// Makes the pictures of `span` that are missing. They go on showing ticks that are cancelled later, which costs
+    /// time and nothing else. Making them anew after 8, 32 or 128 macropulses costs more.
     fn show(&mut self, field: &Field, span: &Range<i64>, memory: &mut Timeline) {
         let extent = field.extent();
         if self.shown != Some(extent.start) {
@@ -134,8 +131,8 @@ impl Search {
         enough
     }
 
-    /// Notes where `needed` marks of the code word may be, in so many `bits` of the pictures from bit
-    /// `first` on, and tells whether they may be anywhere.
+    /// Notes where `needed` marks of the code word may be, in the `bits` bits of the pictures from `first` on. Returns
+    /// true if they may be anywhere.
     fn note_words(&mut self, first: u32, bits: u32, needed: u32) -> bool {
         let blocks = bits.div_ceil(BLOCK as u32) as usize;
         // Blocks are read from anywhere.
@@ -148,8 +145,8 @@ impl Search {
 }
 
 impl Band<'_> {
-    /// The lag with most marks of `shot` in the residual, the earliest of several, of the `lags`
-    /// given, ascending; `None` where fewer than `least` are found anywhere. And how many they are.
+    /// The lag among the ascending `lags` at which most marks of `shot` are in the residual, and their number. The
+    /// earliest of several such lags counts. `None` if fewer than `least` are found everywhere.
     pub(super) fn maximum(
         &mut self,
         shot: usize,
@@ -172,7 +169,7 @@ impl Band<'_> {
         search.places.set(&self.marks, stride);
         let bits = sent.lit_bits(shot).len() as u32;
         let (lit, in_word) = (1.0 - (1.0 - density).powi(COARSE as i32), sent.in_word(shot));
-        // Of a bit that has enough marks any so many have all but those that it may lack.
+        // A bit with enough marks lacks few, so any group of its marks lacks no more than these.
         let lacking = in_word.saturating_sub(least.div_ceil(bits));
         let tell = |marks: &u32| *marks >= lacking + self.chance.in_words.least(*marks, lit);
         let few = (SIXTEEN as u32..in_word).step_by(SIXTEEN).chain([in_word]).find(tell);
@@ -193,7 +190,7 @@ impl Band<'_> {
             for block in (first..=last).step_by(BLOCK as usize) {
                 let mut hits = below(last + 1 - block, [u64::MAX; WIDE], true);
                 if of_word > 0 {
-                    // Eight lags are, so many ticks later, met by two neighbouring bits.
+                    // That many ticks later, two neighbouring bits cover the eight lags.
                     let (words, behind) = (&self.search.words, sent.lit_bits(shot));
                     hits = and(hits, any_behind(words, (block - first) as usize, behind));
                 }
@@ -230,10 +227,10 @@ impl Band<'_> {
     }
 }
 
-/// Stretches of which a [`Group`] is known.
+/// Stretches in a [`Group`].
 const PER_GROUP: usize = 16;
 
-/// What some stretches have: the least, the most, and all together.
+/// The ticks of some stretches: the least, the most, and the sum.
 #[derive(Debug, Clone, Copy)]
 struct Group {
     least: u32,
@@ -249,7 +246,7 @@ impl Group {
         Self { least, most, sum }
     }
 
-    /// Whether light stands out in a stretch: see [`uneven`].
+    /// True if light stands out in a stretch: see [`uneven`].
     fn stands_out(&self, uneven: f64) -> bool {
         let root = |ticks: u32| 2.0 * f64::from(ticks).sqrt();
         root(self.most) - root(self.least) > uneven
@@ -264,7 +261,7 @@ impl Group {
     }
 }
 
-/// Where light that is left over may be looked for.
+/// Places at which light that is left over may be.
 pub(super) struct Leftover<'a> {
     sent: &'a Sent<'a>,
     /// Residual ticks in each cell of a stretch of time.
@@ -275,7 +272,7 @@ pub(super) struct Leftover<'a> {
     cell: i64,
     /// Cells that a macropulse takes up.
     together: usize,
-    /// Of every [`PER_GROUP`] stretches.
+    /// One for every [`PER_GROUP`] stretches.
     groups: Vec<Group>,
     /// Among the stretches before this one no light stands out; `None` until that is asked for.
     even_to: Option<usize>,
@@ -283,12 +280,12 @@ pub(super) struct Leftover<'a> {
     uneven: f64,
 }
 
-/// A search takes hardly any time if so many blocks of lags, each with all its marks, are counted: at
-/// a nanosecond each, a microsecond.
+/// Blocks of lags, times the marks of each, that a search counts in hardly any time: at a nanosecond each, a
+/// microsecond.
 const SOON: i64 = 1000;
 
-/// Light stands out where twice the root of the most ticks in a stretch and of the fewest are so far apart: so far
-/// that chance makes it so in a gate of `stretches` about as often as `false_alarm`.
+/// Light stands out if twice the root of the most ticks in a stretch exceeds twice the root of the fewest by this. In a
+/// gate of `stretches`, chance does so with a probability of about `false_alarm`.
 ///
 /// Twice the root of a count that chance makes has a variance of about 1 \[Ans48\], be light dense or sparse, and
 /// the difference of two has √2 times that deviation. Of fewer than n² pairs, none exceeds √2·Q⁻¹(α/n²) but with
@@ -299,7 +296,7 @@ fn uneven(stretches: f64, false_alarm: f64) -> f64 {
 }
 
 impl<'a> Leftover<'a> {
-    /// Of the ticks at hand from tick `first` on.
+    /// The leftover of the ticks at hand from tick `first` on.
     pub fn new(sent: &'a Sent<'a>, field: &mut Field, first: i64) -> Self {
         let all = first..field.extent().end;
         let (cells, begin) = field.residual_cells(&all);
@@ -351,7 +348,7 @@ impl<'a> Leftover<'a> {
         }
     }
 
-    /// What the stretches that begin in `cells` have.
+    /// The ticks of the stretches that begin in `cells`.
     fn group(&self, cells: Range<usize>) -> Group {
         let whole = cells.start.div_ceil(PER_GROUP)..cells.end / PER_GROUP;
         if whole.is_empty() {
@@ -362,22 +359,22 @@ impl<'a> Leftover<'a> {
         self.groups[whole].iter().fold(before.with(behind), |group, other| group.with(*other))
     }
 
-    /// Whether so many ticks may be anywhere where light of `shot` begins that comes after the `lags`.
+    /// True if light of `shot` that comes after the `lags` may have that number of `ticks` anywhere.
     pub fn may_hold(&self, shot: usize, lags: &Range<i64>, ticks: u32) -> bool {
         let cells = self.cells(self.sent.fired[shot], lags);
         let groups = cells.start / PER_GROUP..cells.end.div_ceil(PER_GROUP);
         self.groups[groups].iter().any(|group| group.most >= ticks)
     }
 
-    /// Whether light of `shot` is looked for after the `lags` only where it stands out: what is soon searched
-    /// need not.
+    /// True if light of `shot` is looked for after the `lags` only where it stands out. A short search need not be
+    /// limited so.
     pub fn must_stand_out(&self, shot: usize, lags: &Range<i64>) -> bool {
         let blocks = (lags.end - lags.start) / (BLOCK * COARSE as i64);
         blocks * i64::from(self.sent.weight(shot)) > SOON
     }
 
-    /// Whether no light stands out before the end of the `lags` of `shot`, so that [`Self::lags`] has none where
-    /// only what stands out is looked for. Up to which stretch that is so is found once, and remembered.
+    /// True if no light stands out before the end of the `lags` of `shot`. Then [`Self::lags`] is empty if only light
+    /// that stands out is looked for. The first stretch that stands out is found once, and remembered.
     pub fn is_even(&mut self, shot: usize, lags: &Range<i64>) -> bool {
         if !self.must_stand_out(shot, lags) {
             return false;
@@ -427,8 +424,8 @@ impl<'a> Leftover<'a> {
         }
         let cells = self.cells(fired, &lags);
         let all = self.group(cells.clone());
-        // What is sought adds to what chance spreads evenly, which is all that is in the emptiest one where
-        // not all of them overlap with what is sought.
+        // The light that is sought adds to the even background. The emptiest stretch has background alone, unless all
+        // of them overlap with that light.
         let enough = enough + if cells.len() > 2 * self.together { all.least } else { 0 };
         if self.must_stand_out(shot, &lags) && !all.stands_out(self.uneven) && !is_even {
             return places;

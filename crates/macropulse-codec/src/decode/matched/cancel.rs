@@ -1,5 +1,5 @@
-//! Cancellation of complete macropulses: those of which no mark is missing are taken off the ticks one
-//! after another, as they come.
+//! Cancellation of complete macropulses: those without a missing mark are taken off the ticks one after another, as
+//! they come.
 //!
 //! 1. In a row: the earliest tick that is not cancelled is taken for the first mark of a macropulse of
 //!    which all marks follow with nothing between them. The shot after the last one found is asked
@@ -15,9 +15,8 @@
 //! pass for noise. A tick of which no macropulse without a gap can begin is left for the receivers
 //! that follow. Where marks are missed everywhere nothing can be cancelled so: this is soon noticed.
 //!
-//! Of the light of guard shots only that is cancelled which may overlap with light of owned ones: what is
-//! older or younger tells nothing of these, and some of it is that of shots that the log does not know, or
-//! ends behind the ticks.
+//! Light of guard shots is cancelled only if it may overlap with light of owned ones. Older or younger light tells
+//! nothing of these. Some of it is that of shots that the log does not know, or ends behind the ticks.
 
 use std::ops::Range;
 
@@ -34,15 +33,15 @@ use crate::kernels::{begin_with, lit_after};
 /// instead of 46, where the steps that follow do the rest. With 256 and one more it takes as long.
 const PATIENCE: (usize, usize) = (16, 2);
 
-/// Ticks that are asked for their order at once where some are laid down: read one after another they are at hand then.
-/// With four times as many a clean `street`, where few are, takes 1.5 % longer, with half of them as long; with a
-/// quarter clean random ranges take 2 % longer.
+/// Ticks whose order is checked at once where some are laid down: they are in the cache when they are read one after
+/// another. With four times this number a clean `street`, where few are laid down, takes 1.5 % longer, and with half of
+/// it equally long. With a quarter clean random ranges take 2 % longer.
 const AT_ONCE: usize = 1024;
 
 /// The lag of a shot that was not found.
 pub(super) const NOWHERE: i64 = i64::MIN;
 
-/// What was found without a gap, and the residual.
+/// The macropulses found without a gap, and the residual.
 #[derive(Debug, Default)]
 pub(super) struct Cancelled {
     /// The lag at which each shot was found, or [`NOWHERE`].
@@ -54,7 +53,7 @@ pub(super) struct Cancelled {
 }
 
 impl Cancelled {
-    /// Whether that is all light, and of one surface of each shot at most.
+    /// True if that is all light, with one surface for each shot at most.
     pub fn is_clear(&self) -> bool {
         self.again.is_empty() && self.residual.is_empty()
     }
@@ -76,8 +75,8 @@ impl Cancelled {
 /// Cancels the complete macropulses of the shots `sent` in `ticks`; `None` where that was given up. Of the timelines
 /// only the memory is used.
 ///
-/// What is found in a row ascends. Other ticks are held against those before them, so that all are when this is
-/// done.
+/// Ticks found in a row ascend. Other ticks are compared with those before them, so that in the end the order of all is
+/// checked.
 ///
 /// # Errors
 /// If the ticks do not ascend.
@@ -169,11 +168,11 @@ struct Canceller<'a> {
     /// As [`Cancelled`] has them.
     lags: Vec<i64>,
     again: Vec<(usize, i64)>,
-    /// Ticks of which no macropulse without a gap can begin, in order.
+    /// Ticks at which no macropulse without a gap can begin, in order.
     left: Vec<u32>,
     patience: usize,
-    /// The ticks at which light of an owned shot may come. What is left before that is of macropulses
-    /// that began even earlier, and behind it of such as end even later.
+    /// The ticks at which light of an owned shot may come. Leftover ticks before that belong to macropulses that began
+    /// even earlier, and those behind it to macropulses that end even later.
     owned: Range<i64>,
     /// Light of no shot before this one can come any more.
     oldest: usize,
@@ -181,7 +180,7 @@ struct Canceller<'a> {
     end: usize,
     /// The shot after the last one found.
     next: usize,
-    /// Of each of these shots, the ticks from each of its first marks to the next one, or 64 where these are more.
+    /// For each of these shots, the ticks from each of its first marks to the next one, or 64 if they are more.
     gaps_of: Range<usize>,
     gaps: [Vec<u8>; FIRST],
     /// The ticks where macropulses overlap, and those of them that are not cancelled.
@@ -192,8 +191,7 @@ struct Canceller<'a> {
 }
 
 impl Canceller<'_> {
-    /// Finds the shot of which all marks are the ticks from `place` on, and tells how many they are; 0
-    /// if there is none.
+    /// Finds the shot whose marks are the ticks from `place` on. Returns their number, or 0 if there is none.
     fn in_a_row(&mut self, place: usize) -> usize {
         let count = self.fits_in_a_row(self.next, place);
         let Some(next) = self.ticks.get(place + 1).filter(|_| count == 0) else { return count };
@@ -242,7 +240,7 @@ impl Canceller<'_> {
         possible.then_some(start)
     }
 
-    /// The shots of which light may come at `tick`, no earlier one than that asked for last.
+    /// The shots whose light may come at `tick`, none earlier than those asked for last.
     fn in_flight(&mut self, tick: i64) -> Range<usize> {
         let fired = &self.sent.fired;
         let farthest = self.sent.reach().end + self.sent.length();
@@ -353,12 +351,12 @@ impl Canceller<'_> {
         self.gaps_of.end = self.gaps_of.end.max(shots.end);
     }
 
-    /// Finds the shot of which `tick` is the first mark that is not cancelled, cancels its marks, and
-    /// tells when its light ends.
+    /// Finds the shot whose first mark that is not cancelled is at `tick`, and cancels its marks. Returns the end of
+    /// its light.
     fn shot_at(&mut self, tick: i64) -> Option<i64> {
         let (in_flight, ahead) = (self.in_flight(tick), self.seen.from(tick));
         self.know_gaps(&in_flight);
-        // Of ticks that may belong to no known shot only what is likely is asked.
+        // Ticks that may belong to no known shot are only tried with likely ones.
         let (parts, most_hidden) = if self.owned.contains(&tick) { (2, FIRST) } else { (1, 1) };
         for lags in self.nearest_first().into_iter().take(parts) {
             for hidden in 0..most_hidden {
@@ -374,8 +372,8 @@ impl Canceller<'_> {
         None
     }
 
-    /// Finds the first of the `shots` as [`Self::shot_at`] does, with so many marks `hidden` and after one of
-    /// the `lags`; `ahead` are the ticks from `tick` on.
+    /// Finds the first of the `shots` as [`Self::shot_at`] does, with `hidden` marks hidden and after one of the
+    /// `lags`. `ahead` are the ticks from `tick` on.
     fn first_of(
         &mut self,
         shots: Range<usize>,
@@ -399,9 +397,9 @@ impl Canceller<'_> {
         None
     }
 
-    /// Finds the shot of which `tick`, the last one left, is any mark, whenever [`CLUE`] more were left in the
-    /// time of a macropulse: all of its first marks may lie under others. Cancels its marks, and tells when its
-    /// light ends.
+    /// Finds a shot with any of its marks at `tick`, the last one left, as all of its first marks may lie under others.
+    /// It is tried whenever [`CLUE`] more were left in the time of a macropulse. Cancels its marks, and returns the end
+    /// of its light.
     fn hidden(&mut self, tick: i64) -> Option<i64> {
         let sent = self.sent;
         let (clues, more) = self.left.as_chunks::<CLUE>();
@@ -423,7 +421,7 @@ impl Canceller<'_> {
         Some(start + sent.length())
     }
 
-    /// Where the macropulse of `shot` begins earliest, if all its marks are there and `tick` is any of them.
+    /// The earliest start of the macropulse of `shot`, if all its marks are there and `tick` is any of them.
     fn start_of_any(&self, shot: usize, tick: i64) -> Option<i64> {
         let (sent, lit_bits) = (self.sent, self.sent.lit_bits(shot));
         let (marks, pattern) = (sent.word(shot).ticks(), &sent.bits(shot).pattern);
@@ -441,7 +439,7 @@ impl Canceller<'_> {
             .min()
     }
 
-    /// Finds `shot` as [`Self::shot_at`] does, with so many marks `hidden` and after one of the `lags`.
+    /// Finds `shot` as [`Self::shot_at`] does, with `hidden` marks hidden and after one of the `lags`.
     fn found_at(
         &mut self,
         shot: usize,
@@ -481,8 +479,8 @@ impl Canceller<'_> {
 /// twice as long; without it a clean one takes a third longer, as some macropulses of each pane begin under others.
 pub(super) const CLUE: usize = 8;
 
-/// Where macropulses overlap ticks are laid down as far as one reaches, and as far again as this part of one. With a
-/// whole one a clean `street` takes 1 % longer, as many overlap with one other alone; with a tenth as long.
+/// Where macropulses overlap, ticks are laid down for the length of one, and this part of one more. With a whole one a
+/// clean `street` takes 1 % longer, as many overlap with one other alone; with a tenth it takes equally long.
 const MORE: i64 = 4;
 
 /// Macropulses that fit into the stretch of time that is laid down where they overlap: it is moved on

@@ -1,4 +1,4 @@
-//! What chance gives: how dense its light is, and how many marks it may light.
+//! Chance: the density of its light, and the number of marks that it may light.
 
 use super::Band;
 use super::acquire::BLOCK;
@@ -6,7 +6,7 @@ use super::sent::Sent;
 use crate::decode::belief::{self, Prior, Surroundings};
 use crate::decode::threshold::{Fewest, Thresholds, fewest};
 
-/// How often chance may leave out as many marks as are missing, or make light so much denser than it is elsewhere.
+/// Probability below which missing marks, or light denser than elsewhere, are not put down to chance.
 pub(super) const BY_CHANCE: f64 = 1e-3;
 
 /// A normal variable exceeds it as often as that.
@@ -36,7 +36,8 @@ pub(super) struct Chance {
 }
 
 impl Chance {
-    /// For the shots `sent`. What is `known` from a band before is kept if it was asked in as many places.
+    /// The chances for the shots `sent`. Tables `known` from a band before are kept if they are for the same number of
+    /// places.
     pub fn new(sent: &Sent, known: Option<Self>) -> Self {
         let (gate, bits) = (sent.gate(), sent.bits_of_payload() as f64);
         let threshold = belief::threshold(sent.correlation.false_alarm);
@@ -79,14 +80,14 @@ impl Band<'_> {
         (ticks, f64::from(self.sent.width) / places.max(1) as f64)
     }
 
-    /// Share of places that are lit in the gate of `shot` by other ticks than so many of its marks;
-    /// one more, so that few ticks do not tell that it is darker than can be known.
+    /// Share of places in the gate of `shot` that ticks light, without `count` of its marks. One tick is added, so that
+    /// few ticks do not claim more darkness than can be known.
     pub(super) fn density_in_gate(&self, shot: usize, count: u32) -> f64 {
         let (ticks, share) = self.in_gate(shot);
         (f64::from(ticks.saturating_sub(self.sent.ticks_at_most(shot, count)) + 1) * share).min(1.0)
     }
 
-    /// The light about `shot` at `lag` without so many of its own `marks`. Ticks that other returns explain count, too.
+    /// The light about `shot` at `lag` without `marks` of its own. Ticks that other returns explain count, too.
     pub(super) fn light_about(&self, shot: usize, lag: i64, marks: u32) -> Surroundings {
         let sent = self.sent;
         let (ticks, length) = self.field.ticks_about(&sent.light(shot, lag));

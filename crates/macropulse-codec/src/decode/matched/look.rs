@@ -7,9 +7,9 @@ use super::pace::usual;
 use super::track::{WAYS, WIDEST_GAP};
 use super::{Band, Detection, SURFACES};
 
-/// So many times as many are passed by where light is so dense that lag after lag of half of the gate
-/// must be counted: a search takes 290 µs then instead of 6. Of 37 268 shots of `car-50m` and 74 519 of `street`
-/// with 10¹⁰ dark counts a second none is lost, and it takes two thirds of the time.
+/// Factor on the shots that are skipped, in light so dense that half of the gate must be counted lag by lag. A search
+/// then takes 290 µs, and otherwise 6 µs. With 10¹⁰ dark counts a second none of 37 268 shots of `car-50m` and of 74
+/// 519 of `street` is lost by this, and decoding takes two thirds of the time.
 const DENSE: f64 = 4.0;
 
 /// Which shots of a block are acquired.
@@ -57,8 +57,8 @@ impl Band<'_> {
                 self.track_or_acquire(shot, None);
             }
         }
-        // Of those in flight together all bright ones must be known, as some that overlap would pass
-        // for a faint one: now those that were passed by.
+        // All bright shots that are in flight together must be known, as some that overlap would pass for a faint one.
+        // Now come those that were skipped.
         for shot in block {
             if self.is_sought(shot) {
                 self.track_or_acquire(shot, Some(Pass::Second));
@@ -78,9 +78,9 @@ impl Band<'_> {
         found.is_some()
     }
 
-    /// The most marks of `shot` that the residual leads to, if no fewer than usual or half of them and
-    /// more than were `tracked`, of the lags within its gate or else beyond: light of a later shot,
-    /// from near by, may pass for light of this one from far away.
+    /// The peak with most marks of `shot` in the residual, at a lag within its gate or else beyond. It has the usual
+    /// number or half of all marks, and more than were `tracked`. Lags beyond count, as light of a later shot, from
+    /// near by, may pass for light of this one from far away.
     fn acquire(
         &mut self,
         shot: usize,
@@ -89,7 +89,7 @@ impl Band<'_> {
     ) -> Option<Detection> {
         let sent = self.sent;
         let weight = sent.weight(shot);
-        // The first pass asks for as many as usual: that bounds so much of the gate that little is counted.
+        // The first pass asks for the usual number. This bound excludes most of the gate, so little is counted.
         let bright = match pass {
             Pass::First => self.usual.least(weight).min(weight.div_ceil(2)),
             Pass::Second => weight.div_ceil(2),
@@ -100,10 +100,10 @@ impl Band<'_> {
         let is_even = pass == Pass::First || self.found[around].iter().any(Option::is_some);
         let (reach, closes) = (sent.reach(), sent.gate().end + sent.length());
         let within = (reach.start..reach.end.min(closes), is_even);
-        // What comes from beyond must stand out, and is bright where it first does: to search for it in the
-        // second pass, too, finds nothing more in the standard scenes and takes a twentieth of the time.
+        // Light from beyond must stand out, and is bright at first. A search for it in the second pass, too, finds
+        // nothing more in the standard scenes, and takes a twentieth of the time.
         let beyond = (pass == Pass::First).then(|| (closes.max(reach.start)..reach.end, false));
-        // Few lags may have as many marks as usual: where one has, no other need be looked at.
+        // Few lags may have the usual number of marks. If one has it, no other need be looked at.
         let usual = Some(self.usual.least(weight)).filter(|usual| *usual > least);
         let found = iter::once(within).chain(beyond).find_map(|(part, is_even)| {
             let (lag, _) = usual.into_iter().chain([least]).find_map(|least| {
@@ -130,7 +130,7 @@ impl Band<'_> {
         self.look_beside(shots.clone(), at_hand);
         for shot in shots.clone() {
             if self.is_open(shot) && self.bright(shot).is_none() {
-                // Where macropulses overlap everywhere, more of them stand out when some are cancelled.
+                // If macropulses overlap everywhere, more of them stand out when some are cancelled.
                 for _ in 0..=SURFACES {
                     let Some(found) = self.look_for_leftover(shot) else { break };
                     self.follow((shot, found), shot + 1..at_hand);
@@ -144,11 +144,11 @@ impl Band<'_> {
         }
     }
 
-    /// Looks for surfaces that stand out beside those found, of the shots until `at_hand`, of which all light is
-    /// known that overlaps with that of the `closed` ones.
+    /// Looks for further surfaces that stand out, of the shots up to `at_hand`. All light that overlaps with that of
+    /// the `closed` ones is known.
     ///
-    /// The last shots come first: most light is near, and until that of a later shot is found it is searched for
-    /// in vain in the gates of all that were in flight before.
+    /// The last shots come first. Most light is near, and until that of a later shot is found, it is searched for in
+    /// vain in the gates of all shots in flight before it.
     fn look_beside(&mut self, closed: Range<usize>, at_hand: usize) {
         let gate = self.sent.gate();
         let next = self.sent.fired.get(at_hand).map_or(i64::MAX, |fired| fired + gate.start);
@@ -168,7 +168,7 @@ impl Band<'_> {
         }
     }
 
-    /// What was found of `shot` and stands out, if no surface but a stronger one is wanted.
+    /// The detection of `shot` that stands out, if only a stronger surface is wanted beside it.
     fn bright(&self, shot: usize) -> Option<Detection> {
         let (sent, gate) = (self.sent, self.sent.gate());
         let is_bright = |known: &Detection| known.stands_out && gate.contains(&known.lag);
@@ -189,7 +189,7 @@ impl Band<'_> {
         Some(self.take_or_cancel(shot, found, most))
     }
 
-    /// The lag with most marks of `shot` that are left over, of the `lags` given, at least so many and more than
+    /// The lag among `lags` with most marks of `shot` that are left over: at least `least` of them, and more than
     /// chance leaves.
     fn most_left(&mut self, shot: usize, lags: &[Range<i64>], least: u32) -> Option<(i64, u32)> {
         if lags.is_empty() {
@@ -219,7 +219,7 @@ impl Band<'_> {
                 }
                 known.count
             }
-            // Of light from beyond the gate no more is wanted.
+            // No further light from beyond the gate is wanted.
             _ => self.least_in_gate(shot),
         };
         let visible = left_over(least);
@@ -240,7 +240,7 @@ impl Band<'_> {
         let is_dense = 2 * self.search.counted() > gate.end - gate.start;
         self.note_search(shot, may_be_even, share, if is_dense { DENSE } else { 1.0 });
         let (lag, count) = most?;
-        // What was found already may be higher, and near enough to be climbed to.
+        // A known detection may be higher, and near enough to be climbed to.
         let found = match known {
             None => self.climb(shot, lag, least),
             Some(_) => self.found_at(shot, lag),
@@ -249,8 +249,8 @@ impl Band<'_> {
         Some(self.take_or_cancel(shot, found, (lag, count)))
     }
 
-    /// Whether light of the shot to the left of `shot` stood out or was not found: what makes this one faint, as
-    /// a pane with a wall behind it, begins here.
+    /// True if light of the shot to the left of `shot` stood out or was not found. Then the cause of its faintness, as
+    /// a pane before a wall, begins here.
     fn is_first_that_is_faint(&self, shot: usize) -> bool {
         let left = self.left[shot].and_then(|left| self.found[left as usize]);
         left.is_none_or(|left| left.stands_out)
@@ -272,8 +272,7 @@ impl Band<'_> {
         found
     }
 
-    /// Notes that in such a `share` of the gate of `shot`, so many `times` as hard to search, nothing was found
-    /// but what was known.
+    /// Notes that a search of this `share` of the gate of `shot`, `times` harder than usual, found nothing new.
     fn note_search(&mut self, shot: usize, may_be_even: bool, share: f64, times: f64) {
         match self.found[shot] {
             // Faint ones are looked at again now and then. If none is, 28 of 74 519 shots of `street` as
@@ -284,7 +283,7 @@ impl Band<'_> {
         }
     }
 
-    /// What was `found` of `shot`, if it is new and to be believed.
+    /// The detection `found` of `shot`, if it is new and believed.
     fn another_surface(&mut self, shot: usize, found: Detection) -> Option<Detection> {
         if self.is_known(shot, found.lag) {
             return None;
@@ -381,24 +380,24 @@ impl Band<'_> {
         tracked.is_some()
     }
 
-    /// Whether `shot` was not found yet, and may be.
+    /// True if `shot` was not found yet, and may be.
     fn is_sought(&self, shot: usize) -> bool {
         self.found[shot].is_none() && self.is_open(shot)
     }
 
-    /// Whether a surface of `shot` was found at `lag`.
+    /// True if a surface of `shot` was found at `lag`.
     fn is_known(&self, shot: usize, lag: i64) -> bool {
         let is_here = |found: Detection| found.lag.abs_diff(lag) < self.sent.width.into();
         self.found[shot].is_some_and(is_here)
             || self.further.iter().any(|(other, found)| *other == shot && is_here(*found))
     }
 
-    /// Whether as many marks were found as of the shots before.
+    /// True if the share of marks is that of the shots before.
     pub(super) fn is_usual(&self, shot: usize, detection: Detection) -> bool {
         detection.count >= self.usual.least(self.sent.weight(shot))
     }
 
-    /// Whether as many marks were found as is usual, or so many that other light does not give them.
+    /// True if the usual number of marks was found, or more than other light gives.
     fn is_bright(&self, shot: usize, detection: Detection) -> bool {
         detection.stands_out || self.is_usual(shot, detection)
     }

@@ -65,8 +65,8 @@ impl<'a> Meter<'a> {
 }
 
 impl Sent<'_> {
-    /// What becomes of all shots of a band if all light was cancelled, one surface of each at most, found after
-    /// these `lags`: nothing is to be asked of them but whether they lie in the gate.
+    /// Settles all shots of a band if all light was cancelled, with one surface for each at most, found at these
+    /// `lags`. The only question left is which of them lie in the gate.
     pub(super) fn settle_clear(&self, lags: &[i64], photons: &mut Photons, returns: &mut Returns) {
         let (gate, owned) = (self.gate(), self.log.owned.clone());
         let mut clear = Vec::with_capacity(owned.len());
@@ -107,20 +107,20 @@ impl Sent<'_> {
     }
 }
 
-/// The energy of returns of which all marks were found, by their number: in clear weather a logarithm
-/// for each shot would take longer than the rest.
+/// The energy of returns without a missing mark, by the number of marks. In clear weather a logarithm for each shot
+/// would take longer than the rest.
 #[derive(Debug, Default)]
 pub(super) struct Photons {
     all_found: Vec<Energy>,
 }
 
 impl Photons {
-    /// That of so many marks.
+    /// The energy for all of `marks` marks.
     fn of_all(&mut self, marks: u32) -> Energy {
         self.up_to(marks)[marks as usize]
     }
 
-    /// Those of no mark, one, and so on, to so many.
+    /// The energies for no mark, one, and so on, up to `marks`.
     fn up_to(&mut self, marks: u32) -> &[Energy] {
         let known = self.all_found.len() as u32;
         self.all_found

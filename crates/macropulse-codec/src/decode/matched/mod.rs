@@ -4,8 +4,8 @@
 //! mark takes tens of microseconds a shot; so the receiver cancels light that it has explained, as multi-user detectors do,
 //! and looks first where light is likely:
 //!
-//! 1. [`cancel`]: macropulses of which every mark is there are taken off the stream of ticks one
-//!    after another: no lag can have more. In clear light this is all.
+//! 1. [`cancel`]: macropulses of which every mark is there are taken off the stream of ticks one after another: no lag
+//!    can have more. In clear light this is all.
 //! 2. [`track`]: neighbouring pixels see neighbouring ranges. About them the exact maximum is taken;
 //!    it is kept at once if as large a share of the marks is found as of the shots before.
 //! 3. [`acquire`]: the exact maximum over the gate, of shots that no neighbour predicts and of those
@@ -64,9 +64,8 @@ pub use neighbours::neighbours;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Effort {
-    /// Searches for one shot in so many where light is faint, finds the others from there, and
-    /// passes by what lies evenly over everything: a target that is barely seen may be lost where
-    /// it stands alone or fills the whole field.
+    /// Searches for some of the shots in faint light, finds the others from there, and skips light that lies evenly
+    /// over everything. A target that is barely seen may be lost if it stands alone or fills the whole field.
     Quick,
     /// Counts every lag of every shot: the reference that the quick receiver is compared with. Takes many times as long in
     /// noise.
@@ -114,10 +113,10 @@ const SURFACES: usize = 3;
 /// Returns of a shot that this receiver can give at most.
 pub(super) const MOST_RETURNS: u8 = 1 + SURFACES as u8;
 
-/// Shots next to one that tell what is to be expected of it: the share of its marks of those before, the lag of
-/// a doubtful one of those to a side. Of 9099 shots of `street` as declared a mean over 32 loses 3, over 2 none. Of
-/// 25 898 shots of a room of which one in three is seen 0.52 % are taken for a sidelobe with 3 to a side, as one
-/// mistake leads to the next, 0.30 % with 5, 0.21 % with 8 and with 12.
+/// Neighbours that define the expectation for a shot. Those before give the share of its marks, and those to a side the
+/// lag of a doubtful one. In `street` as declared a mean over 32 shots loses 3 of 9099, over 2 none. In a room where
+/// one shot in three is seen, with 3 to a side 0.52 % of 25 898 shots are taken for a sidelobe, as one mistake leads to
+/// the next. With 5 it is 0.30 %, with 8 and with 12 it is 0.21 %.
 const NEIGHBOURS: usize = 8;
 
 thread_local! {
@@ -129,7 +128,7 @@ thread_local! {
 #[derive(Default)]
 struct Memory {
     words: Words,
-    /// Of [`cancel`].
+    /// Those of [`cancel`].
     timelines: [Timeline; 2],
     claimed: Timeline,
     field: field::Memory,
@@ -146,26 +145,26 @@ struct Detection {
     count: u32,
     /// The same less those at the best other lag that was looked at.
     margin: u32,
-    /// Whether that is half of all marks, and half of that more than chance gives: chance finds most where
-    /// macropulses overlap, but not as many.
+    /// True if that is half of all marks, and half of it is more than chance gives. Chance finds most marks where
+    /// macropulses overlap, but fewer than this.
     stands_out: bool,
 }
 
 impl Detection {
-    /// So many marks at `lag`, of which no more is known.
+    /// `count` marks at `lag`, of which no more is known.
     fn at(lag: i64, count: u32) -> Self {
         Self { lag, count, margin: 0, stands_out: false }
     }
 }
 
-/// Of which shots light may be found that was not cancelled to begin with.
+/// The shots whose light may not all have been cancelled in the first step.
 #[derive(Debug)]
 enum Open {
-    /// Of all: nothing was cancelled.
+    /// All shots: nothing was cancelled.
     All,
-    /// Of none: all light was cancelled.
+    /// No shot: all light was cancelled.
     None,
-    /// Of those that have ticks left in their gate: so many for each shot.
+    /// Those with ticks left in their gate: the number for each shot.
     Left(Vec<u32>),
 }
 
@@ -178,20 +177,20 @@ struct Band<'a> {
     /// The last shot before each one at the same row of another column.
     left: Vec<Option<u32>>,
     found: Vec<Option<Detection>>,
-    /// Whether nothing was found of the shots that are looked at for what is left over, nor near them.
+    /// True if no light was found of the shots whose leftover is searched, nor near them.
     is_dark_around: bool,
     /// Other surfaces of the shots at hand.
     further: Vec<(usize, Detection)>,
     chance: Chance,
     usual: Usual,
-    /// The time of which all light is at hand.
+    /// The time whose light is all at hand.
     at_hand: Range<i64>,
     /// Fewest ticks that make a return.
     fewest: usize,
-    /// What is left over of it, once that is asked for.
+    /// Its leftover, made when it is first needed.
     leftover: Option<Leftover<'a>>,
-    /// Which shots are searched for that are tracked no more, of which light does not stand out, and
-    /// that are found but faint.
+    /// Pacing of the searches for shots that tracking lost, for those without light that stands out, and for those
+    /// found faint.
     searched: Paced,
     even: Paced,
     again: Paced,
@@ -200,7 +199,7 @@ struct Band<'a> {
     /// The ticks from the start of a macropulse to each of its marks, and the shot whose they are.
     marks: Vec<u32>,
     marks_of: Option<usize>,
-    /// Where these are in the picture.
+    /// The same in the picture.
     in_picture: Vec<u32>,
     search: Search,
     meter: Meter<'a>,
@@ -293,7 +292,7 @@ impl<'a> Band<'a> {
         while first < shots {
             let block = first..self.sent.end_of_block(first, GATES_PER_BLOCK);
             first = block.end;
-            // What overlaps with the light of the last ones may not be known yet.
+            // Light that overlaps with that of the last ones may not be known yet.
             let end =
                 if block.end == shots { shots } else { self.sent.in_flight_before(block.end) };
             let closed = settled..end.max(settled);
@@ -334,7 +333,7 @@ impl<'a> Band<'a> {
         }
     }
 
-    /// Whether no macropulse of the time at hand can have as many ticks as the fewest that are believed.
+    /// True if no macropulse in the time at hand can have the fewest ticks that are believed.
     fn is_too_dark(&self) -> bool {
         let light = self.sent.light(0, 0);
         !self.field.come_together(self.fewest, &self.at_hand, light.end - light.start)
@@ -349,7 +348,7 @@ impl<'a> Band<'a> {
         first.start - (first.end - first.start) - sent.length()..last.end + sent.length()
     }
 
-    /// Whether light of `shot` may be found that was not yet.
+    /// True if `shot` may have light that was not found yet.
     fn is_open(&self, shot: usize) -> bool {
         let may_be_left = match &self.open {
             Open::All => true,
@@ -392,7 +391,7 @@ impl<'a> Band<'a> {
         }
     }
 
-    /// What is left over of the ticks at hand.
+    /// The leftover of the ticks at hand.
     fn leftover(&mut self) -> &mut Leftover<'a> {
         let first = self.at_hand.start;
         self.leftover.get_or_insert_with(|| Leftover::new(self.sent, &mut self.field, first))

@@ -39,8 +39,8 @@ impl Neighbours {
     }
 }
 
-/// How many shots may lead a matched receiver to expect light of one, on average: those of its channel, in its row and in
-/// its column, no farther than it asks.
+/// Mean number of shots from which a matched receiver may predict light of one: those of its channel, in its row and in
+/// its column, within its reach.
 pub fn neighbours(log: &ShotLog) -> f64 {
     let each = log.each_channel().into_iter().flat_map(|(_, log)| {
         [last_beside(&log.row, &log.column), last_beside(&log.column, &log.row)]

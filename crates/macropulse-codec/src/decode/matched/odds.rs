@@ -29,10 +29,11 @@ impl Band<'_> {
         Some(Detection { stands_out, ..detection })
     }
 
-    /// Whether `detection` is believed by the marks that no fuller return claims.
+    /// True if `detection` is believed by the marks that no fuller return claims.
     ///
-    /// Its marks must be spread over the word, unless as many as usual are there and stand out. Light of another word is
-    /// not: it meets the same few marks in every bit, and a part of it may make up a whole return of few bits.
+    /// Its marks must be spread over the word, unless the usual number is there and stands out. Light of another word
+    /// is not spread: it meets the same few marks in every bit, and a part of it may make up a whole return of few
+    /// bits.
     pub(super) fn is_its_own(&mut self, shot: usize, detection: Detection) -> bool {
         let is_bright = detection.stands_out && self.is_usual(shot, detection);
         if !is_bright && !self.is_spread(shot, detection) {
@@ -42,7 +43,7 @@ impl Band<'_> {
         self.is_believed(shot, detection, marks)
     }
 
-    /// Whether the posterior odds of `shot` at `detection` reach the threshold, with `marks` of it for evidence.
+    /// True if the posterior odds of `shot` at `detection` reach the threshold, with `marks` of it for evidence.
     fn is_believed(&mut self, shot: usize, detection: Detection, marks: Marks) -> bool {
         // No prior is less than half of a uniform one, and no evidence less than where all ticks are chance.
         let reach = self.sent.reach();
@@ -139,8 +140,8 @@ impl Band<'_> {
 
     /// Ticks of `shot` at `lag` that are not cancelled.
     ///
-    /// Where each photon makes an event of its own a mark makes several ticks, and several lags have as many marks. `lag` is
-    /// the earliest of them: light may begin later, as much as a mark is looked for.
+    /// If each photon makes an event of its own, a mark makes several ticks, and several lags have the same number of
+    /// marks. `lag` is the earliest of them: light may begin later by the width in which a mark is looked for.
     fn left_of(&self, shot: usize, lag: i64) -> u32 {
         let sent = self.sent;
         let start = sent.fired[shot] + lag - sent.farther();
@@ -150,8 +151,8 @@ impl Band<'_> {
         (0..later).map(left).max().unwrap_or(0)
     }
 
-    /// The lags at which neighbours lead to expect `shot`: on the lines through them, midway between the nearest two, at
-    /// those of the shots before it, and at that of the next one. Where few shots before were found, more behind count.
+    /// The lags that neighbours predict for `shot`: on the lines through them, midway between the nearest two, at those
+    /// of the shots before it, and at that of the next one. If few shots before were found, more behind count.
     pub(super) fn expected_lags(&self, shot: usize) -> Vec<i64> {
         let lag = |shot: usize| Some(self.found.get(shot)?.as_ref()?.lag);
         let before = (0..shot).rev().take(WIDEST_GAP).filter_map(lag);
@@ -170,7 +171,7 @@ impl Band<'_> {
         Prior::new(self.sent.reach(), &self.expected_lags(shot))
     }
 
-    /// Whether `detection` lies outside the gate, and its light is that of a later shot from within.
+    /// True if `detection` lies outside the gate, and its light is that of a later shot from within.
     ///
     /// It is if a later shot has the same macropulse, as near light is likelier than far light; or if the label of `shot` is
     /// contradicted.
@@ -189,7 +190,7 @@ impl Band<'_> {
         is_alike || self.is_mislabelled(shot, detection)
     }
 
-    /// Whether another label explains the light of `shot` at `detection` better than its own.
+    /// True if another label explains the light of `shot` at `detection` better than its own.
     ///
     /// Marks of lit bits are counted in all light, as other returns may explain some of them. Marks of dark bits are
     /// counted in the light that no return explains. But a return in the same word that is less full explains none: it may

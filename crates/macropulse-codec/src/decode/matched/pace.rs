@@ -1,4 +1,4 @@
-//! What the shots before tell: how many marks are usual, and in which shots it is worth to search.
+//! Lessons of the shots before: the usual number of marks, and the shots in which a search is worth while.
 
 use super::NEIGHBOURS;
 use super::chance::HARDLY_EVER;
@@ -11,7 +11,7 @@ use super::chance::HARDLY_EVER;
 /// for in nearly every shot. By the part itself whole rows of far ground are missed.
 pub(super) const LONGEST_PAUSE: f64 = 64.0;
 
-/// Shots of which one in so many is searched for, fewer and fewer as long as none is found.
+/// Pacing: one in a number of shots is searched for, and the number grows as long as none is found.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Paced {
     next: usize,

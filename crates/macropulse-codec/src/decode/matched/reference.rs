@@ -1,7 +1,7 @@
 //! The thorough receiver: every lag of every shot is a hypothesis, and belief alone decides.
 //!
-//! The quick receiver looks where light is likely. This one counts all lags. It shows what the quick one passes by. It
-//! decides by [`belief`](crate::decode::belief) and nothing else:
+//! The quick receiver looks where light is likely. This one counts all lags, and shows the light that the quick one
+//! skips. It decides by [`belief`](crate::decode::belief) and nothing else:
 //!
 //! 1. What the quick receiver found are the first hypotheses. They save time: light that they explain is not searched
 //!    through.
@@ -55,7 +55,7 @@ const MOST_OF_HYPOTHESIS: usize = 4;
 const GATES: i64 = 8;
 const BLOCK_TICKS: i64 = 1 << 25;
 
-/// Light is looked for first so many lags to both sides of an expected one: in all, as many as are counted at once.
+/// Lags to both sides of an expected one in which light is looked for first: together they are counted at once.
 const EXPECTED: i64 = search::BLOCK / 2;
 
 /// A band, and what is known of it.
@@ -193,7 +193,7 @@ impl<'a> Reference<'a> {
         self.search.near_best(&self.residual, &question, (lag, sway))
     }
 
-    /// The best of `peaks` by the prior. Where lags side by side have the same marks, as a mark is looked for in several
+    /// The best of `peaks` by the prior. If lags side by side have the same marks, as a mark is looked for in several
     /// ticks, it is the first of them.
     fn best_of(&self, peaks: &[Peak], prior: &Prior) -> Option<Peak> {
         let best = Peak::best(peaks.iter().map(|peak| peak.with(prior)))?;
@@ -245,7 +245,7 @@ impl<'a> Reference<'a> {
         self.residual.contradiction(&gate, lag, self.search.places(), prior)
     }
 
-    /// Takes light of `shot` at `lag` for a return on trial. What it gives puts that back.
+    /// Takes light of `shot` at `lag` for a return on trial. The result restores the state before.
     fn try_out(&mut self, shot: usize, lag: i64) -> Saved {
         let saved = self.residual.save(&self.residual.touched(shot, lag));
         self.residual.explain(shot, lag);

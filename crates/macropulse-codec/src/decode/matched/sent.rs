@@ -1,4 +1,4 @@
-//! What was sent, as the receiver knows it: shots and code words, counted in ticks.
+//! The light sent, as the receiver knows it: shots and code words, counted in ticks.
 
 use std::cell::OnceCell;
 use std::ops::Range;
@@ -12,7 +12,7 @@ use crate::decode::timing;
 use crate::decode::{Correlation, Pick, Receiver, window};
 use crate::kernels::{Pattern, WordTicks};
 
-/// What was sent.
+/// The light sent.
 pub(super) struct Sent<'a> {
     pub receiver: &'a Receiver,
     pub correlation: &'a Correlation,
@@ -38,8 +38,7 @@ pub(super) struct Sent<'a> {
     pub words: Words,
 }
 
-/// The first marks of a word, of which one may be the first that is not hidden under another
-/// macropulse.
+/// Number of first marks of a word. One of them may be the first that is not hidden under another macropulse.
 pub(super) const FIRST: usize = 3;
 
 /// One of the first marks of a word.
@@ -49,14 +48,14 @@ pub(super) struct First {
     mark: u32,
     /// Ticks from it to the next one; 0 where there is none.
     pub gap: u32,
-    /// Whether the word has as many marks.
+    /// True if the word has that mark.
     exists: bool,
 }
 
 /// The code words of a family and the bits of all labels, in ticks. Kept from band to band: there are hundreds.
 #[derive(Default)]
 pub(super) struct Words {
-    /// Of which family and labels, with so many ticks to a chip and places to a mark.
+    /// The family, payload, ticks to a chip and places to a mark for which it was made.
     of: Option<(Family, Option<Payload>, u32, u32, u32)>,
     words: Vec<Word>,
     labels: Vec<Label>,
@@ -355,14 +354,14 @@ impl<'a> Sent<'a> {
         fired + reach.start..fired + reach.end - 1 + self.length() + i64::from(self.width)
     }
 
-    /// The end of the block of shots that begins with `first` and lasts so many `gates`.
+    /// The end of the block of shots that begins with `first` and lasts `gates` gates.
     pub fn end_of_block(&self, first: usize, gates: i64) -> usize {
         let gate = self.arrival(first);
         let end = self.fired[first] + gates * (gate.end - gate.start);
         self.fired.partition_point(|fired| *fired < end).max(first + 1)
     }
 
-    /// The first shot of which light may still come when that of `shot` does.
+    /// The first shot whose light may still come when that of `shot` does.
     pub fn in_flight_before(&self, shot: usize) -> usize {
         let fired = &self.fired;
         let gate = self.arrival(0);
@@ -370,7 +369,7 @@ impl<'a> Sent<'a> {
         fired.partition_point(|&fired| fired < earliest)
     }
 
-    /// The shots of which light may begin in the `time` if it comes after one of the `lags`.
+    /// The shots whose light may begin in the `time` if it comes after one of the `lags`.
     pub fn that_begin_in(&self, time: &Range<i64>, lags: &Range<i64>) -> Range<usize> {
         let first = self.fired.partition_point(|fired| fired + lags.end < time.start);
         let end = self.fired.partition_point(|fired| fired + lags.start < time.end);
@@ -406,13 +405,13 @@ impl<'a> Sent<'a> {
         self.length() + i64::from(self.width) - 1
     }
 
-    /// Fewest ticks that can be so many marks of `shot`.
+    /// Fewest ticks that `marks` marks of `shot` can make.
     pub fn ticks_of(&self, shot: usize, marks: u32) -> u32 {
         let alone = marks.saturating_sub(self.bits(shot).shared * self.lit_bits(shot).len() as u32);
         alone.max(self.ticks_in_bit(shot, marks))
     }
 
-    /// Fewest ticks that can be so many marks of one bit of `shot`.
+    /// Fewest ticks that `marks` marks in one bit of `shot` can make.
     pub fn ticks_in_bit(&self, shot: usize, marks: u32) -> u32 {
         marks.div_ceil(self.code_word(shot).per_tick)
     }
@@ -422,14 +421,14 @@ impl<'a> Sent<'a> {
         self.weights.iter().copied().filter(|weight| *weight > 0).min()
     }
 
-    /// Fewest ticks that can be so many marks of any shot.
+    /// Fewest ticks that `marks` marks of any shot can make.
     pub fn ticks_of_any(&self, marks: u32) -> u32 {
         let per_tick = self.words.words.iter().map(|word| word.per_tick).max();
         marks.div_ceil(per_tick.unwrap_or(1).max(1))
     }
 
-    /// Ticks about a mark that its own light may light: those in which it is looked for. Where each photon makes an event
-    /// of its own, they are those that are cancelled with it.
+    /// Ticks about a mark that its own light may light: the places at which it is looked for. If each photon makes an
+    /// event of its own, these are cancelled with it.
     pub fn zone(&self) -> u32 {
         match self.correlation.photons_apart {
             true => self.cancelled(),
@@ -437,7 +436,7 @@ impl<'a> Sent<'a> {
         }
     }
 
-    /// Ticks that light of `shot` makes at most if so many `marks` of it are lit, k of N.
+    /// Greatest number of ticks that light of `shot` makes if `marks` of it are lit, k of N.
     ///
     /// A mark makes one tick. But where each photon makes an event of its own, and marks have n photons on average, a mark
     /// stays dark with the probability e⁻ⁿ: k lit ones tell of N·n = N·ln(1/(1 − k/N)) photons. Three deviations are added.
@@ -457,8 +456,8 @@ impl<'a> Sent<'a> {
         self.correlation.false_alarm.min(BY_CHANCE)
     }
 
-    /// Whether surfaces of a shot beside the strongest one are looked for wherever they may be: they are
-    /// asked for, or light of one must not pass for that of a bit that should be dark.
+    /// True if surfaces of a shot beside the strongest one are looked for everywhere. Either the user wants them, or
+    /// their light must not pass for that of a bit that should be dark.
     pub fn wants_further(&self) -> bool {
         self.receiver.returns > 1 || self.receiver.pick != Pick::Strongest
     }

@@ -7,9 +7,9 @@ use crate::kernels::{COARSE, NARROW, and, is_dark, or, places_of, with_enough};
 /// Lags that are counted at once.
 pub(super) const BLOCK: i64 = 64 * NARROW as i64;
 
-/// Blocks to each side of a peak in which a higher one is looked for: as many as the picture bounds at once.
-/// With the one of the peak they hold all sidelobes of words of up to 892 ticks. Of 190 824 shots of `car-50m`
-/// as declared 3 find 122 more than 1; none at all lose one in 200 in good light, too.
+/// Blocks to each side of a peak in which a higher one is looked for: the number that the picture bounds at once. With
+/// the one of the peak they hold all sidelobes of words of up to 892 ticks. In `car-50m` as declared 3 blocks find 122
+/// of 190 824 shots more than 1. Without any, one shot in 200 is lost even in good light.
 const SIDES: i64 = (COARSE as i64 - 1) / 2;
 
 /// The lags to both sides of a peak that are always seen with it.
@@ -20,10 +20,10 @@ pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - OFF;
 /// fewer marks at the ends of a macropulse tell that it is no sidelobe: a noisy scan takes a seventh longer.
 const OFF: i64 = BLOCK / 8;
 
-/// Where light is faint, a shot is looked for near one that was found so many shots away: as many as are
-/// passed by between two searches, so that none between is out of reach. Of 1884 shots of a room in which
-/// one shot in ten can be found 12 find 7 %, 24 find 15 %, these half; of 9670 where half can, 12 lose
-/// 336, both others 100.
+/// In faint light a shot is looked for near one that was found at most this number of shots away. It is the longest
+/// pause between two searches, so that none between is out of reach. In a room where one shot in ten can be found, 12
+/// find 7 % of 1884 shots, 24 find 15 %, and this value half. Where half can be found, 12 lose 336 of 9670 shots, both
+/// others 100.
 pub(super) const WIDEST_GAP: usize = LONGEST_PAUSE as usize;
 
 /// Ways in which the lag of a shot is to be expected.
@@ -52,9 +52,8 @@ impl Band<'_> {
         }
     }
 
-    /// The best peak that chance does not give about the lags at which `shot` is to be expected, one
-    /// of its neighbours at most `gap` shots away. The first one at which as many marks are found as
-    /// is usual is taken.
+    /// The best peak beyond chance about the lags at which neighbours, at most `gap` shots away, predict `shot`. The
+    /// first one with the usual number of marks is taken.
     pub(super) fn tracked(&mut self, shot: usize, gap: usize) -> Option<Detection> {
         let weight = self.sent.weight(shot);
         let usual = self.usual.least(weight);
@@ -92,12 +91,11 @@ impl Band<'_> {
         best
     }
 
-    /// The highest peak that can be climbed to from `lag`. `None` where fewer than `at_least`
-    /// marks fit anywhere around.
+    /// The highest peak that can be climbed to from `lag`. `None` if fewer than `at_least` marks fit everywhere around.
     ///
-    /// The sidelobes of a code word reach almost as far as the word is long, and a peak that does
-    /// not have all its marks may be one of them: then the blocks to both sides are seen, too,
-    /// unless as many marks as usual are there, and marks at both of its ends.
+    /// The sidelobes of a code word reach almost as far as the word is long, and a peak that lacks marks may be one of
+    /// them. Then the blocks to both sides are counted, too, unless the usual number of marks is there, with marks at
+    /// both ends.
     pub(super) fn climb(&mut self, shot: usize, lag: i64, at_least: u32) -> Option<Detection> {
         const STEPS: usize = 64;
         let weight = self.sent.weight(shot);
@@ -121,8 +119,8 @@ impl Band<'_> {
         Some(best)
     }
 
-    /// The highest of the peaks in the blocks to both sides of that around `middle`, if more marks of `shot` are
-    /// found there than at `detection`, or as many earlier.
+    /// The highest of the peaks in the blocks to both sides of that around `middle`, if it has more marks of `shot`
+    /// than `detection`, or the same number earlier.
     pub(super) fn beside(
         &mut self,
         shot: usize,
@@ -147,8 +145,8 @@ impl Band<'_> {
     /// Of each eight lags from about `lag` on, whether `least` marks of `shot` may be found at any of them; and
     /// which is the first.
     ///
-    /// The picture has one bit for the sixteen ticks on which a mark may fall that is so much later: it has as
-    /// many of the marks at least as are found at any of the lags.
+    /// One bit of the picture covers the sixteen ticks on which a mark may fall at any of the lags. So it shows at
+    /// least the marks that are found at any of them.
     fn bounds(&mut self, shot: usize, lag: i64, least: u32) -> ([u64; NARROW], i64) {
         self.lay_out(shot);
         let (fired, seen_at_once) = (self.sent.fired[shot], BLOCK * COARSE as i64);
@@ -184,8 +182,8 @@ impl Band<'_> {
         self.best_in_block(shot, highest?.1)
     }
 
-    /// The marks of the word of `shot` that are `found` where each bit would be from as many bits before
-    /// tick `start` on as a payload has, to twice as many behind it.
+    /// The marks of the word of `shot` that are `found` at the place of each bit, from the length of a payload before
+    /// tick `start` to twice that length behind it.
     fn words_about(&self, shot: usize, start: i64, found: &mut Vec<u32>) {
         let (bits, length) = (self.sent.bits_of_payload(), self.sent.bit_length());
         let (after, pattern) = (self.sent.bits_about(), &self.sent.bits(shot).pattern);
@@ -197,7 +195,7 @@ impl Band<'_> {
         self.best_of(shot, middle, [u64::MAX; NARROW])
     }
 
-    /// What is found of `shot` at exactly `lag`.
+    /// The detection of `shot` at exactly `lag`.
     pub(super) fn found_at(&mut self, shot: usize, lag: i64) -> Option<Detection> {
         let mut only = [0; NARROW];
         only[NARROW / 2] = 1;
@@ -232,9 +230,8 @@ impl Band<'_> {
         Some(Detection { margin, ..Detection::at(first + at, count) })
     }
 
-    /// Whether marks at both ends of the macropulse of `shot` are found, if it comes after `lag`.
-    /// At a sidelobe that far from the peak as the lags beside a block are, those at one of the ends
-    /// have nothing to fall upon, and only chance could light them.
+    /// True if marks at both ends of the macropulse of `shot` are found at `lag`. At a sidelobe beyond the block of the
+    /// peak, those at one of the ends have no light to fall upon, and only chance could light them.
     fn both_ends_are_lit(&mut self, shot: usize, lag: i64) -> bool {
         let sent = self.sent;
         let (start, bits) = (sent.fired[shot] + lag, sent.lit_bits(shot));

@@ -8,7 +8,8 @@ use crate::decode::belief::{Marks, Prior, evidence};
 use crate::decode::{Reject, Returns, Strength};
 
 impl Band<'_> {
-    /// Turns what was found of `shots` into returns: of those found without a gap, as many in a row together.
+    /// Turns the detections of `shots` into returns. Shots found without a gap are turned together, a run of them at a
+    /// time.
     pub(super) fn settle(&mut self, shots: Range<usize>, returns: &mut Returns) {
         let owned = self.sent.log.owned.clone();
         let (mut clear, mut surfaces) = (Vec::new(), Vec::new());
@@ -74,7 +75,7 @@ impl Band<'_> {
         if surfaces.len() > 1 {
             surfaces.sort_by_key(|surface| surface.lag);
             let receiver = self.sent.receiver;
-            // Of one shot, as many marks are as much light.
+            // Within one shot, equal numbers of marks are equal light.
             let strength =
                 |surface: &Detection| Strength { peak: surface.count as u16, light: f32::NAN };
             receiver.pick.keep(receiver.returns.into(), surfaces, strength);
@@ -82,8 +83,8 @@ impl Band<'_> {
         Ok(())
     }
 
-    /// Moves `shot` to the likeliest lag: of those with as many marks, or one fewer, the one with the highest posterior
-    /// odds.
+    /// Moves `shot` to the likeliest lag: among those with the same number of marks, or one fewer, the one with the
+    /// highest posterior odds.
     ///
     /// Several lags may have as many marks. The marks of a word may be a comb, as those of the first prime sequence are.
     /// Shifted by a tooth, a comb falls upon itself but for the last marks in every run of lit bits. If the detector missed
@@ -131,7 +132,7 @@ impl Band<'_> {
             }
         }
         let (_, mut lag, count) = best;
-        // Of those side by side, the first one.
+        // The first of several side by side.
         while self.sent.width > 1
             && prior.lags().contains(&(lag - 1))
             && self.marks_with_ticks(shot, lag - 1) == count
@@ -144,7 +145,7 @@ impl Band<'_> {
         }
     }
 
-    /// Whether there are as many ticks as so many `marks` of `shot` have where it may be in the block around `middle`.
+    /// True if the block around `middle` has the ticks that `marks` marks of `shot` need.
     fn may_have(&self, shot: usize, middle: i64, marks: u32) -> bool {
         let first = self.sent.fired[shot] + middle - BLOCK / 2;
         let (ticks, _) = self.field.ticks_about(&(first..first + BLOCK + self.sent.takes_up()));
@@ -172,8 +173,8 @@ impl Band<'_> {
         (!self.carries_its_label(shot, surface)).then_some(Reject::LabelMismatch)
     }
 
-    /// Whether all light of `shot` was cancelled, and the `surface` from within the gate with it: then it was a
-    /// macropulse without a gap.
+    /// True if all light of `shot` was cancelled, and the `surface` within the gate with it: then it was a macropulse
+    /// without a gap.
     fn is_clear(&self, shot: usize, surface: Detection) -> bool {
         let sent = self.sent;
         surface.count == sent.weight(shot)
@@ -184,9 +185,9 @@ impl Band<'_> {
     /// Whether the marks found are spread over the code word. Light of another word meets the same one
     /// or two of its marks in every bit, and makes many marks of few.
     ///
-    /// Where a share q is found in each of B bits, a mark of the word is found in none of them with
-    /// probability (1 − q)ᴮ. It is not spread if chance leaves out as many of the W marks no more often than
-    /// `BY_CHANCE`.
+    /// If a share q is found in each of B bits, a mark of the word is found in none of them with probability (1 − q)ᴮ.
+    /// The marks are not spread if chance leaves out this number of the W marks with a probability of `BY_CHANCE` or
+    /// less.
     pub(super) fn is_spread(&mut self, shot: usize, detection: Detection) -> bool {
         let sent = self.sent;
         let bits = sent.lit_bits(shot).len();
@@ -200,7 +201,7 @@ impl Band<'_> {
         word - found < self.chance.once.least(word, left_out)
     }
 
-    /// The returns found so far of which light overlaps with `light`.
+    /// The returns found so far whose light overlaps with `light`.
     pub(super) fn overlapping(
         &self,
         light: &Range<i64>,
@@ -221,8 +222,8 @@ impl Band<'_> {
         primary.chain(further.copied())
     }
 
-    /// Whether the label of `shot` fits. Where it is contradicted, further surfaces of the shot are searched for, as their
-    /// light may be what contradicts it.
+    /// True if the label of `shot` fits. If it is contradicted, further surfaces of the shot are searched for, as their
+    /// light may cause the contradiction.
     fn carries_its_label(&mut self, shot: usize, detection: Detection) -> bool {
         for _ in 0..SURFACES {
             if !self.is_mislabelled(shot, detection) {

@@ -12,7 +12,7 @@ use crate::time::fs_from_s;
 /// Half the speed of light, m/s.
 const HALF_C: f64 = 149_896_229.0;
 
-/// A log of so many shots, all of them owned.
+/// A log of `shots` shots, all of them owned.
 fn log(shots: usize) -> ShotLog {
     ShotLog {
         fired_at_fs: (0..shots as i64).map(|shot| shot * 1_000_000_000_000).collect(),
@@ -41,7 +41,7 @@ fn charges(tones: &[Tone], range: f64, (charge, dark): (f64, f64)) -> Vec<f64> {
     tones.iter().flat_map(of).collect()
 }
 
-/// What Poisson's law makes of `charges`, shot after shot.
+/// Poisson variables with the means `charges`, shot after shot.
 fn drawn(charges: &[f64], shots: usize, seed: u64) -> Taps {
     let mut chance = ChaCha8Rng::seed_from_u64(seed);
     let laws: Vec<_> = charges.iter().map(|mean| Poisson::new(*mean).unwrap()).collect();
@@ -163,7 +163,7 @@ fn a_wrong_interval_is_as_likely_as_the_noise_of_the_coarse_phase_says() {
 }
 
 /// H0: shots without modulated light have returns at the accepted rate. N = 200 000, seed 3, α = 1e-6 (|z| < 4.9).
-/// Control: half as many are noticed.
+/// Control: half the rate is noticed.
 #[test]
 fn noise_makes_returns_at_the_accepted_rate() {
     let tones = vec![Tone::pure(5e7, 4, 0.5), Tone::pure(4e7, 3, 0.5)];

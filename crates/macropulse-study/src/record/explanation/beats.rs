@@ -18,7 +18,7 @@ pub(super) struct Spectra {
     ramps: Vec<RampPeaks>,
     /// Power from which on the peaks of a return are accepted together, in units of the mean of noise.
     threshold: f64,
-    /// What peaks of all ramps say together, the strongest first.
+    /// The measurements that peaks of all ramps make together, the strongest first.
     candidates: Vec<Pair>,
     pub scale: Scale,
 }

@@ -1,4 +1,4 @@
-//! What speaks for each lag of the gate, as charts.
+//! Charts of the evidence for each lag of the gate.
 
 use std::ops::Range;
 
@@ -71,7 +71,7 @@ pub(super) struct Words {
     pub axis: &'static str,
     pub all: &'static str,
     pub left: &'static str,
-    /// Whether the lowest of several lags is drawn of the second curve.
+    /// True if the second curve shows the lowest of several lags.
     pub is_left_lowest: bool,
 }
 

@@ -56,7 +56,7 @@ enum Sender {
 }
 
 impl Light {
-    /// The light of `arrivals` in the time of `shot`, the marks of which leave at the ticks `sent`.
+    /// The light of `arrivals` in the time of `shot`, whose marks leave at the ticks `sent`.
     pub fn new(arrivals: &Arrivals, shot: &Shot, sent: &[u32]) -> Self {
         let sender = |train: &Arrival| match train.transmitter {
             0 if train.shot == shot.id() => Sender::ThisShot,

@@ -163,7 +163,7 @@ struct Decision<'a> {
     record: Record,
 }
 
-/// What the receiver of `design` makes of the `record` of shot number `at` of `log` alone.
+/// The result of the receiver of `design` for the `record` of shot number `at` of `log` alone.
 fn alone<'a>(
     design: &Design,
     log: &ShotLog,
@@ -352,7 +352,7 @@ pub fn explanation_files(scan: u64, (row, column): Pixel) -> [String; 4] {
     ["txt", "json", "svg", "png"].map(|ending| format!("explain-{scan:06}-{row}-{column}.{ending}"))
 }
 
-/// Whether a file of a run is an explanation, by its name.
+/// True if a file of a run is an explanation, by its name.
 pub(super) fn is_explanation(file: &str) -> bool {
     file.starts_with("explain-") && file.ends_with(".json")
 }

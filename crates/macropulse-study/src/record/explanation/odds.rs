@@ -1,4 +1,4 @@
-//! What the rule of belief says of a shot.
+//! The odds of a shot by the rule of belief.
 
 use macropulse::codec::decode;
 use macropulse::codec::decode::belief::Prior;
@@ -33,7 +33,7 @@ pub(super) struct Odds {
     label_contradiction_nats: Option<f32>,
     /// First and last lag that have a prior probability.
     reach_ticks: [i64; 2],
-    /// Where neighbours lead to expect light.
+    /// The places at which neighbours predict light.
     expected: Vec<Expected>,
 }
 

@@ -65,7 +65,7 @@ pub(super) fn decision<'a>(
     })
 }
 
-/// What the `codes` of a shot tell, frequency by frequency.
+/// The phasors that the `codes` of a shot give, frequency by frequency.
 fn tones(design: &Design, codes: &[u16]) -> Result<Vec<Tone>, decode::Error> {
     let Method::Phase(method) = &design.receiver.method else { return Ok(Vec::new()) };
     let mut left = codes;

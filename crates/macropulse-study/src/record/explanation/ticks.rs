@@ -253,8 +253,7 @@ impl Ticks {
         });
     }
 
-    /// What came of a macropulse with its marks `sent`, and the correlation; each chart with what is
-    /// said of it.
+    /// The ticks of a macropulse with its marks `sent`, and the correlation; each chart with its caption.
     pub fn charts(
         &self,
         sent: &[u32],
@@ -291,8 +290,7 @@ impl Ticks {
         Some(arrivals.into_iter().chain(curves).collect())
     }
 
-    /// What arrives in the time of one macropulse: where the correlation is highest, or else where
-    /// light of the shot is.
+    /// The arrivals in the time of one macropulse: at the highest correlation, or else at the light of the shot.
     fn arrivals(&self, whole: &Whole, sent: &[u32], light: Option<&Light>) -> Option<Chart> {
         let lanes_of_light = light.map(Light::lanes);
         let of_light = || {

@@ -1,10 +1,10 @@
 //! Light to beats: a receiver that mixes it with that of its laser.
 //!
-//! Of each path the light in the mode of the laser is a field whose size and phase vary from shot to shot as one speckle
-//! does: a complex normal variable. Mixed with the laser it is a beat. Of S detected photons in a ramp the spectrum has a
-//! peak of the mean power S over that of noise, the shot noise of the laser being 1. Frequencies, and with them phases,
-//! differ between the ramps; the size of the field does not. `spectrum` draws bins, `waveform` samples; the peaks of both
-//! are found and measured by `peaks`.
+//! The light of each path in the mode of the laser is a field. Its size and phase vary from shot to shot like one
+//! speckle: it is a complex normal variable. Mixed with the laser it is a beat. S detected photons in a ramp give a
+//! peak in the spectrum with the mean power S, where the shot noise of the laser has the power 1. Frequencies and
+//! phases differ between the ramps; the size of the field does not. `spectrum` draws bins, and `waveform` draws
+//! samples; `peaks` finds and measures the peaks of both.
 //!
 //! Pulses of other lidars make no beat: their frequencies are outside the bandwidth of the receiver. The motion of a surface
 //! during a shot, 0.2 mm at 15 m/s, is neglected.
@@ -87,7 +87,7 @@ struct Path {
 }
 
 impl Mixer {
-    /// That of `design`, where so many photons of sunlight are detected per second in the mode of its laser.
+    /// The mixer of `design`. `background` is the photons of sunlight detected per second in the mode of its laser.
     pub fn new(coherent: &Coherent, design: &Design, background: f64) -> Self {
         let (chirp, spectrum) = (&coherent.chirp, &coherent.spectrum);
         let bins_of = |(ramp, share): (Ramp, f64)| {

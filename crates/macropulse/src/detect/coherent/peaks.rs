@@ -17,7 +17,7 @@ pub(super) struct Bins {
     /// Number of the first one.
     pub first: i64,
     pub fields: Vec<Complex64>,
-    /// What is laid over the ramp.
+    /// The window over the ramp.
     pub window: SpectralWindow,
 }
 
@@ -91,7 +91,7 @@ impl Bins {
 /// 2/(1 + √5).
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// The strongest `count` of the peaks `found`, in places for as many.
+/// The strongest `count` of the peaks `found`, filled up to that number.
 pub(super) fn strongest(mut found: Vec<Peak>, count: usize) -> Vec<Peak> {
     // Equal powers keep their order by frequency, so that the record does not depend on how they were found.
     found.sort_by_key(|peak| (std::cmp::Reverse(peak.power), peak.frequency));

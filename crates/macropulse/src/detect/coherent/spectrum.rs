@@ -48,7 +48,7 @@ impl Spectra {
         let mut found = Vec::new();
         let near = self.near(ramp, &tones);
         for &(from, to) in &near {
-            // So far beyond that all peaks are measured by as many bins.
+            // Farther by `NEAR`, so that every peak is measured with the same number of bins.
             let (first, last) = (from - NEAR - 1, to + NEAR + 1);
             let fields = (first..last)
                 .map(|bin| {

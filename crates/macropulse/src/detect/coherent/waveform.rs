@@ -88,7 +88,7 @@ impl Waveforms {
         let mut samples = vec![Complex64::default(); count];
         let root = (count as f64).sqrt();
         let begins = self.begins[at];
-        // What falls turns the other way.
+        // The field of a falling ramp turns the other way.
         let sense = ramp.ramp.bandwidth.signum();
         for tone in tones {
             let step = turned(TAU * tone.bins / count as f64);
