@@ -13,13 +13,19 @@ fn here() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// Cargo, run in this package.
+fn cargo() -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(here());
+    cargo
+}
+
 /// The program of this source, which is to give the same bytes. It is built as for one of its own tests, which in a
 /// run of all tests it has been: alone, with fewer features of what it is made of, all that would be compiled again.
 fn program() -> PathBuf {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let build =
         ["test", "--quiet", "--no-run", "--workspace", "--test", "commands", "--target-dir"];
-    call(Command::new(cargo).current_dir(here()).args(build).arg(target().unwrap())).unwrap();
+    call(cargo().args(build).arg(target().unwrap())).unwrap();
     target().unwrap().join("debug").join("macropulse")
 }
 
@@ -62,9 +68,8 @@ fn wheel() -> &'static Path {
 
 /// Packages and their features, as in `cargo tree` with `options`, this one left out.
 fn compiled(options: &[&str]) -> BTreeSet<String> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let form = ["tree", "--no-dedupe", "--prefix", "none", "--format", "{p} {f}"];
-    let printed = call(Command::new(cargo).current_dir(here()).args(form).args(options)).unwrap();
+    let printed = call(cargo().args(form).args(options)).unwrap();
     let others = printed.lines().filter(|line| !line.starts_with("macropulse-py "));
     others.map(str::to_owned).collect()
 }

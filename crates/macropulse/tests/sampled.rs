@@ -48,7 +48,7 @@ fn room(range: f64, reflectance: f64) -> Scene {
     Scene::from_toml(&text, "room", Path::new("")).unwrap()
 }
 
-/// What was found of half a line: pixels, points to within 0.3 m, others, and mean and rms error, m.
+/// Results for half a line: pixels, points to within 0.3 m, others, and mean and rms error, m.
 struct Found {
     pixels: f64,
     right: f64,

@@ -82,13 +82,13 @@ fn errors_of(sensor: usize) -> &'static Errors {
     MEASURED[sensor].get_or_init(|| errors(&Design::open(name, &[]).unwrap(), environment))
 }
 
-/// Of each range one band.
+/// Measures one band at each range.
 fn errors(design: &Design, environment: &str) -> Errors {
     let all: Vec<Band> = short_bands(design, 0).collect();
     let (mut of_range, mut of_word) = (Vec::new(), HashMap::<u16, Sums>::new());
     let metres = design.clock.tick_fs as f64 * 1e-15 * SPEED_OF_LIGHT / 2.0;
     for (number, range) in RANGES.into_iter().enumerate() {
-        let part: Vec<Band> = vec![all[number % all.len()]];
+        let part = [all[number % all.len()]];
         let mut words = HashMap::new();
         for log in part.iter().map(|band| band.shot_log(design)) {
             for shot in log.owned.clone() {

@@ -479,8 +479,9 @@ impl Canceller<'_> {
 /// twice as long; without it a clean one takes a third longer, as some macropulses of each pane begin under others.
 pub(super) const CLUE: usize = 8;
 
-/// Where macropulses overlap, ticks are laid down for the length of one, and this part of one more. With a whole one a
-/// clean `street` takes 1 % longer, as many overlap with one other alone; with a tenth it takes equally long.
+/// Ticks of overlapping macropulses are laid down for the length of one macropulse, and this part of it more. With a
+/// whole length more a clean `street` takes 1 % longer, as many overlap with one other alone. A tenth makes no
+/// difference.
 const MORE: i64 = 4;
 
 /// Macropulses that fit into the stretch of time that is laid down where they overlap: it is moved on

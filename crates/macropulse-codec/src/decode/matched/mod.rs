@@ -151,7 +151,7 @@ struct Detection {
 }
 
 impl Detection {
-    /// `count` marks at `lag`, of which no more is known.
+    /// A detection of `count` marks at `lag`, before anything else is measured.
     fn at(lag: i64, count: u32) -> Self {
         Self { lag, count, margin: 0, stands_out: false }
     }

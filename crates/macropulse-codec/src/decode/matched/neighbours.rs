@@ -39,8 +39,8 @@ impl Neighbours {
     }
 }
 
-/// Mean number of shots from which a matched receiver may predict light of one: those of its channel, in its row and in
-/// its column, within its reach.
+/// Mean number of neighbours of a shot, from which a matched receiver predicts its light. They are in its channel, in
+/// its row or its column, and within reach.
 pub fn neighbours(log: &ShotLog) -> f64 {
     let each = log.each_channel().into_iter().flat_map(|(_, log)| {
         [last_beside(&log.row, &log.column), last_beside(&log.column, &log.row)]

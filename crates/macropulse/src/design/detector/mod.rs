@@ -148,13 +148,13 @@ pub(in crate::design) trait Typed {
     /// Detections per photon, if the file says it, under the key `efficiency`.
     fn efficiency(&self) -> Option<f64>;
 
-    /// Which of its keys are without effect; none, unless a kind says so.
+    /// Its keys without effect: none, unless a kind says otherwise.
     fn idle(&self) -> Idle {
         Idle::NONE
     }
 
-    /// What of the light it follows. A sensor must declare that it leaves out the rest. All of it,
-    /// unless a kind says so.
+    /// The properties of light that it follows: all, unless a kind says otherwise. A sensor must declare those that it
+    /// leaves out.
     fn follows(&self) -> Follows {
         Follows { bandwidth: true, neighbouring_chips: true }
     }
