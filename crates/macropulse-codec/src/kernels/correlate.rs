@@ -73,7 +73,7 @@ impl<const W: usize> Counts<W> {
     /// Counts, for each lag of the block, how many of the marks are lit: bit `place + first + lag` of
     /// `words` for each of `places`, none of them behind the `farthest`.
     fn count_each(&mut self, words: &[u64], first: u32, places: &[u32], farthest: u32) {
-        debug_assert!(places.iter().all(|place| *place <= farthest));
+        debug_assert!(places.iter().max().is_none_or(|place| *place <= farthest));
         let mut longer = Vec::new();
         let (words, first) = reached(words, first, farthest as usize + 64 * W, &mut longer);
         self.expect(places.len());

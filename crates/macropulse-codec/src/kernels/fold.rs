@@ -109,13 +109,14 @@ macro_rules! folder {
         unsafe fn $sums(words: &[u64], first: u32, bits: &[u32], planes: &mut [u64]) {
             adders!(add, add_two, $sum, $carry, $and, $xor);
             let length = planes.len() / SUMS;
+            let farthest = bits.iter().map(|bit| first.wrapping_add(*bit)).max().unwrap_or(0);
+            debug_assert!(farthest as usize / 64 + length < words.len());
             let (threes, rest) = bits.as_chunks::<3>();
             for block in (0..length).step_by($lanes) {
                 let words = &words[block..];
                 macro_rules! bits {
                     ($bit:expr) => {{
                         let bit = first.wrapping_add($bit);
-                        debug_assert!(bit as usize / 64 + $lanes < words.len());
                         // SAFETY: the caller answers for the bits.
                         unsafe { $cut(words.as_ptr(), bit) }
                     }};
@@ -158,12 +159,13 @@ macro_rules! folder {
         ) {
             adders!(add, add_two, $sum, $carry, $and, $xor);
             let length = sums.len() / SUMS;
+            let farthest = word.iter().copied().max().unwrap_or(0);
+            debug_assert!(farthest as usize / 64 + W < length);
             let (sevens, rest) = word.as_chunks::<7>();
             for block in (0..W).step_by($lanes) {
                 let mut counts = [[$dark(); OF_WORD]; USED];
                 macro_rules! sums {
                     ($weight:ident, $mark:expr) => {{
-                        debug_assert!(block + $mark as usize / 64 + $lanes < length);
                         // SAFETY: the caller answers for the marks.
                         unsafe { $cut(sums.as_ptr().add(length * $weight + block), $mark) }
                     }};

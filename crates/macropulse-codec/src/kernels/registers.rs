@@ -89,6 +89,8 @@ macro_rules! counter {
             out: &mut [u64],
         ) {
             let blocks = if TELLS { out.len() / $lanes } else { 1 };
+            let farthest = places.iter().map(|place| first.wrapping_add(*place)).max().unwrap_or(0);
+            debug_assert!(farthest as usize / 64 + $lanes * blocks < words.len());
             for block in 0..blocks {
                 let words = &words[$lanes * block..];
                 let [mut ones, mut twos, mut fours, mut eights] = [$dark(); LOW];
@@ -97,7 +99,6 @@ macro_rules! counter {
                 macro_rules! bits {
                     ($place:expr) => {{
                         let bit = first.wrapping_add($place);
-                        debug_assert!(bit as usize / 64 + $lanes < words.len());
                         // SAFETY: the caller answers for the places.
                         unsafe { $cut(words.as_ptr(), bit) }
                     }};
