@@ -1,5 +1,5 @@
-//! What is measured: bands spread over a scan of `kim-park-2016`, with what they meet and the
-//! ticks of it, under detectors of every quality.
+//! The sample for measurements: bands spread over a scan of `kim-park-2016`, with their hits and ticks, under
+//! detectors of every quality.
 
 use std::hint::black_box;
 use std::slice;
@@ -25,7 +25,7 @@ use crate::page;
 /// Seed of all that is drawn.
 pub const SEED: u64 = 20_160_913;
 
-/// What is scanned; `random` is a white target for every shot, anywhere in the range gate.
+/// Scenes; `random` is a white target for every shot, anywhere in the range gate.
 pub const SCENES: [&str; 3] = ["car-50m", "street", "random"];
 
 /// Farther from all surfaces of its shot than this, m, a return is wrong.
@@ -59,7 +59,7 @@ impl Condition {
         self.design_to(150.0)
     }
 
-    /// The same with a range gate to so many metres.
+    /// The same with a range gate to `gate` metres.
     pub fn design_to(self, gate: f64) -> Fallible<Design> {
         let Self::Noise { missed, counts } = self else {
             return Ok(Design::open("kim-park-2016", &[])?);
@@ -111,7 +111,7 @@ pub struct Echo {
     pub label: u16,
 }
 
-/// What the receiver is given of a band.
+/// The receiver's input for a band.
 pub type Given = (ShotLog, Ticks);
 
 impl Sample {
@@ -140,12 +140,12 @@ impl Sample {
         Ok(Self { design, operating, finishes, bands })
     }
 
-    /// Shots of which returns are wanted.
+    /// Number of shots whose returns are wanted.
     pub fn shots(&self) -> f64 {
         self.bands.iter().map(|(band, _)| band.shots as f64).sum()
     }
 
-    /// The speed at which they took so many seconds.
+    /// The speed for a time of `seconds`.
     pub fn speed(&self, seconds: f64) -> f64 {
         self.design.speed(self.shots(), seconds)
     }
@@ -168,8 +168,8 @@ impl Sample {
             let wanted = Wanted { known_busy, from: span.start };
             let Converted { mut ticks, peak_busy, .. } = tdc::ticks(&self.design, response, wanted);
             ticks.keep(&span);
-            // As in a whole scan: how many converters were busy is known of the bands before, and there is no
-            // shot of which only some light is there.
+            // As in a whole scan, the number of busy converters is known for the bands before, and no shot
+            // has only a part of its light there.
             known_busy = peak_busy;
             done(&mut memory, (self.design.cut().known(&log), ticks));
         }
@@ -201,14 +201,14 @@ impl Sample {
         self.bands.iter().map(of_band).collect()
     }
 
-    /// What the receiver is given.
+    /// The receiver's input.
     pub fn given(&self) -> Vec<Given> {
         let mut given = Vec::new();
         self.ticks(&self.detectors(), |_, band| given.push(band));
         given
     }
 
-    /// What it makes of that.
+    /// The receiver's returns.
     pub fn decode(&self, given: &[Given]) -> Result<Vec<Returns>, decode::Error> {
         let Design { receiver, emission, .. } = &self.design;
         given
@@ -279,7 +279,8 @@ pub struct Score {
 }
 
 impl Score {
-    /// Adds the owned shots of `log`, before which so many were met by `hits` that are `unknown` to the receiver.
+    /// Adds the owned shots of `log`; `hits` begins with those of `unknown` shots that the receiver does not
+    /// know.
     fn add(
         &mut self,
         design: &Design,

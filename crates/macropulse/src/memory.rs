@@ -15,45 +15,45 @@ use crate::units::s_from_fs;
 /// it: the system decides how many it maps at once.
 const PROGRAM: u64 = 24_000_000;
 
-/// Of a shape, or of a copy of a mesh.
+/// Bytes of a shape, or of a copy of a mesh.
 const PER_COPY: u64 = 512;
 
-/// Of a mark of the codebook, with what the receiver makes of it.
+/// Bytes of a mark of the codebook, with the receiver's tables.
 const PER_MARK: u64 = 4;
 
-/// Of a pixel of a scan, with its return and the truth.
+/// Bytes of a pixel of a scan, with its return and the truth.
 const PER_PIXEL: u64 = 60;
 
-/// Of the same where it is written: as one list, and what a page or a format makes of that.
+/// Bytes of the same pixel while it is written: as one list, and in the form of a page or format.
 const PER_WRITTEN: u64 = 130;
 
-/// Of a shot of a band: log, hits, pulse trains.
+/// Bytes of a shot of a band: log, hits, pulse trains.
 const PER_SHOT: f64 = 400.0;
 
-/// Of the same where the mirror moves on during a macropulse, and the hits of its parts are kept.
+/// Bytes of the same shot if the mirror moves during a macropulse, and the hits of its parts are kept.
 const PER_MOVING_SHOT: f64 = 6_000.0;
 
-/// Of a mark that is detected: its time, and its tick.
+/// Bytes of a mark that is detected: its time, and its tick.
 const PER_MARK_SEEN: f64 = 20.0;
 
-/// Of a detection event without light of lidars: its time, before and after it is merged with others,
+/// Bytes of a detection event without light of lidars: its time, before and after it is merged with others,
 /// and its tick.
 const PER_NOISE: f64 = 40.0;
 
-/// Of a sample of a channel: its code, and the same once more where it is written.
+/// Bytes of a sample of a channel: its code, and the same once more while it is written.
 const PER_SAMPLE: f64 = 4.0;
 
-/// Of a sample of the one channel that is simulated or decoded: its signal and noise, filtered, what hides it,
-/// and what the receiver weighs of it.
+/// Bytes of a sample of the one channel that is simulated or decoded: its signal and noise, the filtered
+/// signal, what hides it, and its weight.
 const PER_SAMPLE_AT_WORK: f64 = 40.0;
 
-/// Of a bin of a histogram: its count, and the same once more where it is written.
+/// Bytes of a bin of a histogram: its count, and the same once more while it is written.
 const PER_BIN: f64 = 8.0;
 
-/// Of a tap: its code, and the same once more where it is written.
+/// Bytes of a tap: its code, and the same once more while it is written.
 const PER_TAP: f64 = 4.0;
 
-/// Of a peak: its frequency and its power, and the same once more where it is written.
+/// Bytes of a peak: its frequency and its power, and the same once more while it is written.
 const PER_PEAK: f64 = 16.0;
 
 /// The memory of a run, bytes.
@@ -65,7 +65,7 @@ pub struct Estimate {
     pub scene: u64,
     /// The points of a scan.
     pub scan: u64,
-    /// What is made of them when they are written.
+    /// Their form while they are written.
     pub written: u64,
     /// The bands under way, one on each thread: what one takes.
     pub band: u64,
@@ -107,7 +107,7 @@ impl Estimate {
         Self { written: 0, ..self }
     }
 
-    /// All of it together, with so many `threads`.
+    /// The sum of all parts, with this number of `threads`.
     pub fn total(&self, threads: usize) -> u64 {
         let bands = self.band.saturating_mul(threads as u64);
         let parts = [self.sensor, self.scene, self.scan, self.written, bands];

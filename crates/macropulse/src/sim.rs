@@ -41,7 +41,7 @@ pub struct Scan {
     pub pieces: Vec<Piece>,
     /// How the pixels came out.
     pub score: Score,
-    /// What was counted on the way.
+    /// Counts of the run.
     pub tally: Tally,
     /// The cloud without its returns and pixels.
     frame: PointCloud,
@@ -168,19 +168,19 @@ impl<'a> Scans<'a> {
         self.part_kept(&bands, watch, keep)
     }
 
-    /// Whether ticks come with amplitudes.
+    /// Set if ticks come with amplitudes.
     pub fn measure(&self) -> bool {
         self.detectors.measure()
     }
 
-    /// What the receiver is given of a band.
+    /// The receiver's input for a band.
     pub fn record(&self, band: &Band) -> (ShotLog, Given) {
         let Self { design, scene, operating, chance, detectors, .. } = self;
         let seen = Seen { design, scene, operating, chance: *chance };
         record::of(&Setup { seen, detectors }, band)
     }
 
-    /// What comes to the detector in a stretch of the time of a band: truth, for people who ask why;
+    /// The light and noise at the detector in a stretch of the time of a band: truth, for people who ask why;
     /// the receiver is not given it.
     pub fn arrivals(&self, band: &Band, stretch: &Stretch) -> Arrivals {
         let Self { design, scene, operating, chance, detectors, .. } = self;
@@ -244,7 +244,7 @@ fn viewpoint(pose: &Pose) -> Viewpoint {
     Viewpoint { position: pose.position, turn: pose.rotation.quaternion() }
 }
 
-/// What the receiver was given of a band.
+/// The receiver's input for a band.
 #[derive(Debug, Clone, Copy)]
 pub struct Record<'a> {
     /// The band.
@@ -315,13 +315,13 @@ fn surfaces(design: &Design, log: &ShotLog, traced: &Traced) -> u64 {
     met as u64
 }
 
-/// What all bands of a run have in common.
+/// The common parts of all bands of a run.
 struct Setup<'a> {
     seen: Seen<'a>,
     detectors: &'a Detectors<'a>,
 }
 
-/// Measures a band of a scan of which it is `known` that so many converters were busy at once.
+/// Measures a band of a scan; `known` tells the number of converters that were busy at once.
 fn measure<'a>(
     setup: &Setup<'a>,
     memory: &mut Memory,
@@ -341,7 +341,7 @@ fn measure<'a>(
     Ok(measured)
 }
 
-/// What the receiver of `design` makes of the record `given` of the shots of `log`.
+/// The returns of the receiver of `design` from the record `given` of the shots of `log`.
 ///
 /// # Errors
 /// As [`Receiver::decode`](macropulse_codec::decode::Receiver::decode).
@@ -415,7 +415,7 @@ pub struct Tally {
     pub peak_busy: u32,
     /// Returns decoded.
     pub returns: u64,
-    /// Of these the first, the second ones of their shots, and so on.
+    /// The returns by their number in their shot: the first ones, the second ones, and so on.
     pub by_number: [u64; MOST_RETURNS as usize],
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],

@@ -1,5 +1,5 @@
-//! What closed forms say of a candidate: the energy that eyes allow, the least aperture that does, and what
-//! stands in the way.
+//! Assessment of a candidate by closed forms: the energy that eyes allow, the least aperture that does, and
+//! the limit that it meets first.
 
 use argmin::core::{CostFunction, Executor, State};
 use argmin::solver::neldermead::NelderMead;
@@ -13,22 +13,22 @@ use super::candidate::Candidate;
 use super::requirements::Requirements;
 use super::{Error, Limit};
 
-/// The area of the aperture is found to so much of itself.
+/// Relative tolerance of the area of the aperture.
 const TOLERANCE: f64 = 0.02;
 
 /// Areas of the aperture are tried from the largest one allowed by such factors, up to [`MOST`] of it.
 const STRIDE: f64 = 4.0;
 
-/// What needs more than so many times the area is not told by how much.
+/// Beyond this factor on the area, the factor is not told.
 const MOST: f64 = 1e6;
 
-/// Of a Gaussian low-pass the rms length of its response times its bandwidth, √(ln 2)/(2π).
+/// Rms length of the response of a Gaussian low-pass times its bandwidth, √(ln 2)/(2π).
 const RMS_BY_BANDWIDTH: f64 = 0.132_505_181_759_698_4;
 
-/// A mark must be so many samples long at least (rms): a sampled detector takes no shorter one.
+/// Least rms length of a mark in samples: a sampled detector takes no shorter one.
 const SAMPLES: f64 = 1.0 / 1.5;
 
-/// What closed forms say of a candidate.
+/// Assessment of a candidate by closed forms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assessed {
     /// The candidate, its energy what eyes and its receiver allow, its aperture the least that does; the largest allowed
@@ -40,7 +40,7 @@ pub struct Assessed {
     pub pd: f64,
     /// Standard deviation of the range there, m; `None` where next to nothing is seen.
     pub precision: Option<f64>,
-    /// What stands in its way, and by what factor it is missed; `None` where it does.
+    /// The limit in its way, and the factor by which it is missed; `None` for a candidate that does.
     pub limit: Option<(Limit, f64)>,
 }
 
@@ -59,7 +59,7 @@ pub(super) fn energy(design: &Design, required: &Requirements) -> Option<f64> {
     strictest(design.eye_limits()).map(|limit| required.parts.energy_share * limit.energy)
 }
 
-/// Energy of a shot, J, of which it is only asked how much more eyes allow.
+/// Energy of a shot, J, small enough to ask only how much more eyes allow.
 pub(super) const DIM: f64 = 1e-12;
 
 /// As bright as eyes allow.
@@ -92,8 +92,8 @@ fn bearable(required: &Requirements, candidate: Candidate) -> Result<(Candidate,
     Ok((late, share))
 }
 
-/// The target wanted sends back so much of what the converter has codes for at most. More light would find nothing
-/// more, and what is clipped for long near the end of the range gate is lost.
+/// Largest share of the codes of the converter for the echo of the target wanted. More light would find
+/// nothing more, and long clipping near the end of the range gate would lose echoes.
 const SCALE: f64 = 0.5;
 
 /// `candidate`, no brighter than the converter bears with its aperture.
@@ -113,7 +113,7 @@ pub(super) fn within_scale(
     Ok(Candidate { energy, ..candidate })
 }
 
-/// What closed forms say of `candidate`, which is as bright as eyes and its stray light allow.
+/// The assessment of `candidate`, which is as bright as eyes and its stray light allow.
 pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<Assessed, Error> {
     let wanted = &required.wanted;
     let design = candidate.design(required)?;
@@ -141,7 +141,7 @@ pub(super) fn assess(required: &Requirements, candidate: Candidate) -> Result<As
     Ok(Assessed { candidate, period, pd: forecast.pd, precision: forecast.precision, limit })
 }
 
-/// Where `candidate` is forecast to find least of the targets wanted, up to the range wanted.
+/// The target wanted, up to the range wanted, at which `candidate` is forecast to find least.
 pub(super) fn worst(required: &Requirements, candidate: &Candidate) -> Result<Worst, Error> {
     let wanted = &required.wanted;
     let design = candidate.design(required)?;
@@ -150,7 +150,7 @@ pub(super) fn worst(required: &Requirements, candidate: &Candidate) -> Result<Wo
     Ok(Worst { range: worst.range, pd: worst.pd })
 }
 
-/// As with so many times the area of the aperture: light and daylight.
+/// The forecaster with `factor` times the area of the aperture: light and daylight.
 fn with_area<'a>(forecaster: &Forecaster<'a>, factor: f64) -> Forecaster<'a> {
     forecaster.with_light(factor).with_background(factor)
 }
@@ -183,9 +183,9 @@ fn area(required: &Requirements, forecaster: &Forecaster, period: f64) -> f64 {
     high
 }
 
-/// The range next to `range`, m, and no farther, at which echoes come half-way between the shots of a channel,
-/// `period` seconds apart; `range` itself where that is beyond. Where echoes come with a shot, marks are lost
-/// to its stray light, some metres of all: how many that is of all ranges a simulation tells.
+/// The range closest to `range`, m, and no farther, at which echoes come half-way between the shots of a
+/// channel, `period` seconds apart; `range` itself if that is beyond. An echo that comes with a shot loses
+/// marks to its stray light, over some metres in all: a simulation tells the share of all ranges.
 fn clear(range: f64, period: f64) -> f64 {
     let between = range_from_tof(period);
     match (range / between).floor() {

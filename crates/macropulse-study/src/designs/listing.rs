@@ -1,4 +1,4 @@
-//! What a search found, as text for people.
+//! The findings of a search, as text for people.
 
 use super::candidate::{SCHEMES, scheme};
 use super::frontier::{CHANNELS, Frontier};
@@ -8,7 +8,7 @@ use super::{Assessed, Best, Bill, Found, Limit, Skipped, Worst};
 use crate::text::{Columns, broken, section, short};
 
 impl Limit {
-    /// What stands in the way, in a few words.
+    /// The limit in a few words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Time => "time",
@@ -24,7 +24,7 @@ impl Limit {
     }
 }
 
-/// What stands in the way, and by what factor.
+/// The limit and its factor.
 pub(super) fn told(limit: Option<(Limit, f64)>) -> String {
     match limit {
         None => "does".to_owned(),
@@ -111,7 +111,8 @@ impl Found {
         columns
     }
 
-    /// Of each photodiode and number of marks, the fewest beams that do and those with the least aperture.
+    /// For each photodiode and number of marks, the fewest beams that do, and the beams with the least
+    /// aperture.
     fn table_of_parts(&self) -> String {
         let mut text = format!(
             "  {:<16} {:>5} {:>6} {:>6} {:>9} {:>9} {:>8} {:>8} {:>8} {:>9}  {}\n",
@@ -147,8 +148,8 @@ impl Found {
         text
     }
 
-    /// Of each photodiode and number of marks the fewest beams that do in closed form; the one that fails by
-    /// least where none does.
+    /// For each photodiode and number of marks, the fewest beams that do in closed form; if none does, the
+    /// candidate that fails by least.
     pub(super) fn outstanding(&self) -> Vec<&Assessed> {
         let mut outstanding: Vec<&Assessed> = Vec::new();
         for one in &self.assessed {
@@ -184,7 +185,7 @@ impl Found {
         }
     }
 
-    /// What the best lidars are made of, a quantity in each line. Empty where none does.
+    /// The parts of the best lidars, a quantity in each line. Empty if there are none.
     pub(super) fn side_by_side(&self) -> String {
         let [coded, waiting] = &self.best;
         let named = [
@@ -224,7 +225,7 @@ impl Found {
         text
     }
 
-    /// What each lidar takes behind every polygon; empty where there is none.
+    /// Needs of each lidar behind every polygon; empty without a polygon.
     pub(super) fn table_of_mirrors(&self) -> String {
         let mut text = String::new();
         for it in &self.mirrors {
@@ -251,7 +252,7 @@ impl Found {
         }
     }
 
-    /// What the comparison takes for granted, one assumption in a paragraph.
+    /// The assumptions of the comparison, one in a paragraph.
     pub(super) fn assumptions(&self) -> String {
         let mut all: Vec<String> = ASSUMPTIONS.map(str::to_owned).to_vec();
         if let Some(it) = &self.in_flight {
@@ -279,7 +280,7 @@ impl Found {
         }
     }
 
-    /// What the search comes to: a sentence for each answer.
+    /// The result of the search: a sentence for each answer.
     pub fn verdict(&self) -> Columns {
         let mut columns = Columns::default();
         for (name, best) in SCHEMES.into_iter().zip(&self.best) {
@@ -339,7 +340,7 @@ impl Found {
     }
 }
 
-/// What every comparison takes for granted.
+/// The assumptions of every comparison.
 pub(super) const ASSUMPTIONS: [&str; 5] = [
     "Each lidar has a mirror of its own, as large as parts.polygon_mm and as fast as parts.tip_m_per_s allow. How much of \
      its turn a polygon draws decides how many channels both need.",

@@ -5,7 +5,7 @@ use macropulse::design::Polygon;
 use super::keys::number;
 use super::requirements::Requirements;
 
-/// Where a sensor says what polygon leads its beams, if it has one.
+/// Key of the polygon that leads the beams of a sensor, if it has one.
 pub(super) const POLYGON: &str = "scan.raster.mirror.polygon";
 
 /// Polygons are made in whole steps of this diameter, m.
@@ -15,12 +15,13 @@ const STEP: f64 = 1e-3;
 const MOST_FACETS: u32 = 360;
 
 impl Requirements {
-    /// Whether candidates have a polygon: whether the sensor has one that the requirements name.
+    /// Tells if candidates have a polygon: if the sensor has one that the requirements name.
     pub(super) fn has_polygon(&self) -> bool {
         number(&self.template, &format!("{POLYGON}.facets")).is_some()
     }
 
-    /// Facets of the sensor's polygon, for the field wanted: as many as draw in no larger share of the time.
+    /// Facets of the sensor's polygon, for the field wanted: the number that draws in no larger share of the
+    /// time.
     pub(super) fn usual_facets(&self) -> Option<u32> {
         let of_sensor = |key: &str| number(&self.template, key);
         let (facets, field) =
@@ -29,9 +30,9 @@ impl Requirements {
         Some(scaled.clamp(2.0, f64::from(MOST_FACETS)) as u32)
     }
 
-    /// Mirrors for so many beams, those with the most facets first, which leave a channel the most time. Each holds
-    /// the least aperture without being too large or too fast. One `None` where the sensor has no polygon; empty
-    /// where every polygon is too large or too fast.
+    /// Mirrors for this number of `beams`, the one with the most facets first: it leaves a channel the most
+    /// time. Each holds the least aperture without being too large or too fast. One `None` if the sensor has
+    /// no polygon; empty if every polygon is too large or too fast.
     pub(super) fn mirrors(&self, beams: u32) -> Vec<Option<u32>> {
         if !self.has_polygon() {
             return vec![None];
@@ -50,12 +51,12 @@ impl Requirements {
         }
     }
 
-    /// Share of the time in which a polygon with so many facets draws.
+    /// Share of the time in which a polygon with `facets` facets draws.
     pub(super) fn duty(&self, facets: u32) -> f64 {
         self.horizontal() / Polygon::sweep(facets)
     }
 
-    /// The smallest polygon with so many facets for such an `aperture`, m, and for the beam beside it.
+    /// The smallest polygon with `facets` facets for this `aperture`, m, and for the beam beside it.
     pub(super) fn polygon(&self, aperture: f64, facets: u32) -> Polygon {
         let beam = number(&self.template, "light.beam_diameter_mm").unwrap_or(0.0) * 1e-3;
         let of = |diameter| Polygon { facets, diameter };
@@ -67,13 +68,13 @@ impl Requirements {
         self.wanted.horizontal_deg.to_radians()
     }
 
-    /// Lines that each of so many beams draws in a second.
+    /// Lines that each of `beams` beams draws in a second.
     pub(super) fn lines(&self, beams: f64) -> f64 {
         f64::from(self.wanted.rows) / beams * self.wanted.scans_per_s
     }
 
-    /// The largest aperture, m, that is allowed and that a polygon holds which is neither too fast nor too large, with
-    /// so many beams and facets.
+    /// The largest aperture, m, that is allowed and that fits a polygon neither too fast nor too large, with
+    /// this number of beams and facets.
     pub(super) fn most_aperture(&self, beams: u32, facets: Option<u32>) -> f64 {
         let most = self.parts.aperture_mm[1] * 1e-3;
         let Some(facets) = facets else { return most };
@@ -118,9 +119,9 @@ mod tests {
         let most = required.most_aperture(16, Some(6));
         approx::assert_relative_eq!(most, 0.03815, max_relative = 1e-3);
         assert_eq!(required.polygon(most, 6).diameter, 0.116);
-        // Half as many lines, and the file's own limit holds.
+        // With half the lines, the file's own limit holds.
         assert_eq!(required.most_aperture(32, Some(6)), 0.05);
-        // Of a quarter of the field as large a share of the time with four times as many facets.
+        // A quarter of the field is drawn in the same share of the time with four times the facets.
         let mut narrow = required;
         narrow.wanted.horizontal_deg = 10.8;
         assert_eq!(narrow.usual_facets(), Some(24));

@@ -29,47 +29,47 @@ const SOONEST: f64 = 60e-9;
 /// a word, and marks are smeared less.
 const APART: f64 = 150e-9;
 
-/// Between the least aperture of closed forms, which know of no other light than its own, and the largest that
-/// is allowed, the one that does is looked for by so many halves: to a fifteenth where they are 25 and 50 mm.
+/// Halvings between the least aperture of closed forms, which ignore the light of others, and the largest
+/// that is allowed: to a fifteenth for 25 and 50 mm.
 const HALVINGS: u32 = 3;
 
-/// Apertures are rounded up to so much, m.
+/// Apertures are rounded up to a multiple of this, m.
 const ROUND: f64 = 0.5e-3;
 
-/// A mirror must hold so many times the aperture that closed forms ask for, as simulations ask for more; or else one
-/// with fewer facets is taken, which holds more.
+/// Factor by which a mirror must hold more than the aperture of closed forms, as simulations ask for more.
+/// Otherwise one with fewer facets is taken, which holds more.
 const SPARE: f64 = 1.2;
 
 /// All that was found.
 #[derive(Debug)]
 pub struct Found {
-    /// What was required.
+    /// The requirements.
     pub required: Requirements,
     /// Every combination of parts that closed forms were asked about.
     pub assessed: Vec<Assessed>,
     /// Combinations that are no lidar.
     pub skipped: Vec<Skipped>,
-    /// What was simulated, in the order of marks and beams.
+    /// The simulated candidates, in the order of marks and beams.
     pub trials: Vec<Trial>,
     /// The best coded lidar, and the best that waits: with the fewest beams, and of those the smallest
     /// aperture. `None` where nothing does.
     pub best: [Option<Best>; 2],
     /// With how few channels single pulses could do, in closed form; `None` where none waits that does.
     pub in_flight: Option<InFlight>,
-    /// What each of them takes behind every polygon; empty where there is none.
+    /// Needs of each of them behind every polygon; empty without a polygon.
     pub mirrors: Vec<Mirror>,
     /// Up to where each of them goes; `None` if one is missing.
     pub frontier: Option<Frontier>,
-    /// What the best coded lidar hangs on.
+    /// Changes that show what the best coded lidar depends on.
     pub ablations: Vec<Ablation>,
 }
 
 /// The best lidar of its kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Best {
-    /// What it found.
+    /// Its simulation.
     pub trial: Trial,
-    /// What it is made of.
+    /// Its parts.
     pub bill: Bill,
 }
 
@@ -88,7 +88,7 @@ pub struct Skipped {
 
 /// How a search is made.
 pub struct Search<'a> {
-    /// What is required.
+    /// The requirements.
     pub required: Requirements,
     /// Folder of the files that keep what was counted.
     pub folder: &'a Path,
@@ -154,8 +154,8 @@ impl Search<'_> {
 }
 
 impl Requirements {
-    /// About how many shots a search simulates, for those who wait for it: of each number of marks as many
-    /// trials as halves take, and the ablations.
+    /// Approximate number of shots that a search simulates, for those who wait for it: the trials of all
+    /// halvings for each number of marks, and the ablations.
     pub fn most_shots(&self) -> u64 {
         let halves = u64::from((self.parts.beams.len() + 1).ilog2() + 1 + HALVINGS);
         let trials = halves * self.parts.marks.len() as u64 + ABLATIONS as u64;
@@ -163,7 +163,7 @@ impl Requirements {
     }
 }
 
-/// What closed forms say of all combinations.
+/// Assessments of all combinations by closed forms.
 #[derive(Debug, Default)]
 struct Closed {
     assessed: Vec<Assessed>,
@@ -192,7 +192,7 @@ fn assess_all(required: &Requirements, watch: &Watch) -> Result<Option<Closed>, 
         all.assessed.extend(one.assessed);
         all.skipped.extend(one.skipped);
     }
-    // Where nothing is a lidar the reason is hardly that of one combination.
+    // If no combination is a lidar, the reason is hardly that of one.
     match (all.assessed.is_empty(), all.skipped.first()) {
         (true, Some(Skipped { part, marks, beams, why })) => Err(Error::Asked(format!(
             "{part} with {marks} marks and {beams} beams, as all others, is no lidar: {why}"
@@ -215,7 +215,7 @@ struct Timed {
 }
 
 impl Combination<'_> {
-    /// All numbers of beams, in closed form. What is no lidar is skipped.
+    /// All numbers of beams, in closed form. Combinations that are no lidar are skipped.
     fn assess(&self) -> Closed {
         let mut closed = Closed::default();
         let beams = &self.required.parts.beams;
@@ -362,9 +362,9 @@ fn sample(design: &Design) -> f64 {
     design.clock.tick_fs as f64 * 1e-15
 }
 
-/// Simulates candidates of so many marks, with the largest aperture, until it is known with how few beams they
-/// do; and those with ever less aperture. By halves: with more beams there is more time between shots, with
-/// more aperture more light, and all is easier. `None` if the watch said stop.
+/// Simulates candidates with `marks` marks: with the largest aperture, until the fewest beams that do are
+/// known; then those with ever less aperture. By halves: more beams leave more time between shots, more
+/// aperture gives more light, and both make it easier. `None` if the watch said stop.
 fn fewest_beams(
     bench: &Bench,
     assessed: &[Assessed],
@@ -409,8 +409,8 @@ fn fewest_beams(
     Ok(Some(trials))
 }
 
-/// Of each number of beams with so many `marks` the candidate with the smallest aperture that does in closed
-/// form; ascending.
+/// The candidate with the smallest aperture that does in closed form, for each number of beams with `marks`
+/// marks; ascending.
 fn smallest(assessed: &[Assessed], marks: u32) -> Vec<&Candidate> {
     let does = |one: &&Assessed| one.candidate.marks == marks && one.limit.is_none();
     let mut all: Vec<&Candidate> = assessed.iter().filter(does).map(|one| &one.candidate).collect();
@@ -422,7 +422,7 @@ fn smallest(assessed: &[Assessed], marks: u32) -> Vec<&Candidate> {
     all
 }
 
-/// Of what was simulated and does, the one with the fewest beams, and of those the smallest aperture.
+/// The simulated candidate that does with the fewest beams, and among those with the smallest aperture.
 fn best(trials: &[Trial], waits: bool) -> Option<&Trial> {
     let does = |trial: &&Trial| trial.candidate.waits() == waits && trial.limit.is_none();
     trials.iter().filter(does).min_by(|one, other| {

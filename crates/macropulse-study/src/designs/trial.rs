@@ -22,7 +22,7 @@ use super::{Error, Limit};
 /// Pixels of a trial, about: of 1e-4 false points accepted two are then seen, of 1e-3 wrong ones twenty.
 pub(super) const PIXELS: u64 = 40_000;
 
-/// What was counted of a scene. The same on every machine.
+/// Counts of a scene. The same on every machine.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Counts {
@@ -65,7 +65,7 @@ impl Counts {
         [self.false_points, self.pixels - self.echoes]
     }
 
-    /// Whether they can be those of one scene: a file of them may have been damaged, or written by hand.
+    /// Tells if they can be those of one scene: a file of them may have been damaged, or written by hand.
     fn add_up(&self) -> bool {
         let most = self.pixels.saturating_mul(MOST_RETURNS.into());
         let returns = [self.wrong, self.false_points, self.right];
@@ -85,20 +85,20 @@ impl Counts {
     }
 }
 
-/// What a candidate found of every scene.
+/// The simulation of a candidate in every scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// The candidate.
     pub candidate: Candidate,
-    /// What it found, in the order of [`Scenery::ALL`].
+    /// Its counts, in the order of [`Scenery::ALL`].
     pub counts: [Counts; 2],
-    /// Where it is forecast to find least, up to the range wanted.
+    /// The place at which it is forecast to find least, up to the range wanted.
     pub worst: Worst,
-    /// What it fails by, and the factor; `None` where it does all that is wanted.
+    /// The limit by which it fails, and the factor; `None` if it does all that is wanted.
     pub limit: Option<(Limit, f64)>,
 }
 
-/// What a trial is made with.
+/// The equipment of trials.
 pub(super) struct Bench<'a> {
     pub required: &'a Requirements,
     /// Folder of the files that keep what was counted.
@@ -108,7 +108,7 @@ pub(super) struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    /// What `candidate` finds; `None` if the watch said stop.
+    /// Simulates `candidate`; `None` if the watch said stop.
     pub fn trial(&self, candidate: &Candidate) -> Result<Option<Trial>, Error> {
         let Some(counts) = self.of_each(candidate, &[])? else { return Ok(None) };
         let worst = worst(self.required, candidate)?;
@@ -116,7 +116,7 @@ impl Bench<'_> {
         Ok(Some(Trial { candidate: candidate.clone(), counts, worst, limit }))
     }
 
-    /// What `candidate`, with some keys of its sensor changed, finds of each scene, in the order of
+    /// Simulates `candidate`, with some keys of its sensor changed, in each scene, in the order of
     /// [`Scenery::ALL`]; `None` if the watch said stop.
     pub fn of_each(
         &self,
@@ -131,7 +131,7 @@ impl Bench<'_> {
         Ok(Some(counts))
     }
 
-    /// What `candidate`, with some keys of its sensor changed, finds of a scene; from its file if it was
+    /// The counts of `candidate`, with some keys of its sensor changed, in a scene; from its file if it was
     /// counted before. `None` if the watch said stop.
     fn counts(
         &self,
@@ -173,7 +173,8 @@ impl Bench<'_> {
     }
 }
 
-/// What `cloud` holds of the scene `set` within the `gate`, m, and `within` which error, m, a return is right.
+/// The counts of `cloud` in the scene `set`, inside the `gate`, m; a return is right with an error of
+/// `within` at most, m.
 fn counted(cloud: &PointCloud, set: &Set, (gate, within): (f64, f64)) -> Counts {
     let mut counts = Counts::default();
     let mut found = vec![false; cloud.fired_ns.len()];
@@ -207,7 +208,7 @@ fn counted(cloud: &PointCloud, set: &Set, (gate, within): (f64, f64)) -> Counts 
     counts
 }
 
-/// Where files of trials lie in a folder of results.
+/// The place of the files of trials in a folder of results.
 pub(super) fn folder_of_trials(folder: &Path) -> PathBuf {
     folder.join("trials")
 }

@@ -48,23 +48,22 @@ const PHASES: usize = 4;
 /// Probabilities of detection at which a forecast is tried.
 const WANTED: [f64; 4] = [0.1, 0.5, 0.8, 0.95];
 
-/// A probability may be off by so much, by so many standard deviations of what was found, or by what it changes with
-/// [`LIGHT_WITHIN`].
+/// Accepted errors of a probability: absolute, and in standard deviations of the result. An error within its
+/// change with [`LIGHT_WITHIN`] is accepted, too.
 const PD_WITHIN: (f64, f64) = (0.02, 3.0);
 
-/// Where neighbours help each other, a little more light finds many more shots. A forecast may take the light for so
-/// large a share less or more, a tenth of a decibel.
+/// Share by which a forecast may take the light for more or less, a tenth of a decibel: if neighbours help
+/// each other, a little more light finds many more shots.
 const LIGHT_WITHIN: f64 = 0.02;
 
 /// A precision may be off by such a share of what was found.
 const PRECISION_WITHIN: f64 = 0.2;
 
-/// The share of points on a sidelobe may be off by so much, or by so many standard deviations of what was
-/// found.
+/// Accepted errors of the share of points on a sidelobe: absolute, and in standard deviations of the result.
 const ASIDE_WITHIN: (f64, f64) = (0.002, 3.0);
 
-/// Points so many standard deviations from the truth, and not right either, lie on a sidelobe. Of normal
-/// errors one in 500 million is as large.
+/// A point that is not right lies on a sidelobe from this number of standard deviations on. One in 500
+/// million normal errors is that large.
 const BESIDE: f64 = 6.0;
 
 /// So many standard deviations to both sides have nearly all returns.
@@ -93,14 +92,14 @@ pub struct Place {
     /// Share of the points on a sidelobe of their own macropulse, forecast and found; where there is such a
     /// forecast.
     pub aside: Option<[f64; 2]>,
-    /// Points with light, of which `aside` is a share.
+    /// Points with light; `aside` is a share of them.
     pub points: usize,
     /// False and wrong points per shot, forecast and found.
     pub false_per_shot: [f64; 2],
 }
 
 impl Place {
-    /// Whether the probability is as forecast.
+    /// Tells if the probability is as forecast.
     pub fn pd_holds(&self) -> bool {
         let [forecast, found] = self.pd;
         let [least, most] = self.pd_between;
@@ -109,21 +108,21 @@ impl Place {
             || (least..=most).contains(&found)
     }
 
-    /// Whether all that was found is as forecast.
+    /// Tells if all results are as forecast.
     pub fn holds(&self) -> bool {
         let aside = self.aside_holds() != Some(false);
         self.pd_holds() && self.precision_holds() != Some(false) && aside
     }
 
-    /// Whether as many points lie on a sidelobe as forecast; `None` where there is no such forecast.
+    /// Tells if the share of points on a sidelobe is as forecast; `None` without such a forecast.
     pub fn aside_holds(&self) -> Option<bool> {
         let [forecast, found] = self.aside?;
         let deviation = (forecast * (1.0 - forecast) / self.points.max(1) as f64).sqrt();
         Some((forecast - found).abs() <= ASIDE_WITHIN.0.max(ASIDE_WITHIN.1 * deviation))
     }
 
-    /// Whether the precision is as forecast; `None` where it was not found, or is so large that returns are lost beyond
-    /// what counts as seen.
+    /// Tells if the precision is as forecast; `None` if it was not found, or is so large that returns are
+    /// lost beyond what counts as seen.
     pub fn precision_holds(&self) -> Option<bool> {
         let (forecast, found) = self.precision_m;
         let (forecast, found) = forecast.zip(found)?;
@@ -138,7 +137,7 @@ impl Place {
 pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Error> {
     let ready = Design::open(sensor, &[])?;
     let design = match ready.receiver.method {
-        // What is forecast is what is there to be found.
+        // The forecast tells what is there to be found.
         Method::Matched(..) => {
             Design::open(sensor, &[("receiver.effort".into(), "\"thorough\"".into())])?
         }

@@ -10,7 +10,7 @@ use super::{Effect, Error};
 use crate::names::{line_column, offset_of_key, toml_value};
 use crate::{opened, told};
 
-/// Where values come from that are changed on the command line.
+/// Origin of values that are changed on the command line.
 const SET: &str = "--set";
 
 /// A sensor file may extend another, but not without end.
@@ -25,7 +25,7 @@ pub const WITHOUT: &str = "without";
 /// The key of the effects left out.
 const IDEALISED: &str = "idealised";
 
-/// What a file that extends another does not take from it: a sentence about that one.
+/// Key that a file does not take from the one it extends: a sentence about that one.
 const PROSE: &str = "summary";
 
 /// Keys that exclude each other: the name of their table, which is empty for the top of the file, and the keys.
@@ -39,7 +39,7 @@ struct Document {
     origin: String,
     text: String,
     table: Table,
-    /// Where the files lie that it names.
+    /// Folder of the files that it names.
     folder: PathBuf,
 }
 
@@ -48,13 +48,13 @@ struct Document {
 #[derive(Debug, Clone)]
 pub(super) struct Chain {
     documents: Vec<Document>,
-    /// What the chain says when read as one.
+    /// The chain of files, merged into one.
     pub merged: Table,
-    /// Whether effects were switched on the command line.
+    /// Set if effects were switched on the command line.
     is_switched: bool,
 }
 
-/// Where a key was typed.
+/// Place at which a key was typed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Typed {
     /// On the command line.
@@ -152,7 +152,7 @@ impl Chain {
             return;
         };
         list.retain(|name| name.as_str() != Some(effect));
-        // What is no effect is refused with the list.
+        // A name that is no effect is refused with the list.
         if out || !Effect::ALL.iter().any(|known| known.name() == effect) {
             list.push(effect.into());
         }
@@ -181,8 +181,8 @@ impl Chain {
         document.map_or_else(|| PathBuf::from(name), |document| document.folder.join(name))
     }
 
-    /// Where the key at the dotted `path` was typed, if it was: with `--set`, or in the file itself.
-    /// Who switches an effect has typed the list of them.
+    /// The place at which the key at the dotted `path` was typed, if it was: with `--set`, or in the file
+    /// itself. A person who switches an effect has typed the list of them.
     pub fn typed(&self, path: &str) -> Option<Typed> {
         if self.is_switched && path == IDEALISED {
             return Some(Typed::Set);
@@ -310,7 +310,7 @@ fn document_of_overrides(overrides: &[(String, String)]) -> Result<Document, Err
 /// Adds to `strong`, the table called `name`, what only `weak` has.
 fn fill_in(strong: &mut Table, mut weak: Table, name: &str, alternatives: &Alternatives) {
     for (_, kinds) in alternatives.iter().filter(|(table, _)| *table == name) {
-        // Of a family there is nothing but its kind, be it misspelt.
+        // Only the kind of a family is kept, be it misspelt.
         if name == "family" || kinds.iter().any(|kind| strong.contains_key(*kind)) {
             weak.retain(|kind, _| strong.contains_key(kind) || !kinds.contains(&kind));
         }

@@ -29,13 +29,13 @@ use crate::kernels::GROUP;
 use crate::random::{Address, Chance, Stage};
 use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s};
 
-/// Steps in a response at least. Of 4000 pulses with the noise of one crossing in 10⁴ responses the times that 8
-/// and 16 steps tell differ by 0.008 of a response, rms, at the threshold, and by 0.004 at five times
-/// the threshold. Whether pulses cross is told between the steps, see [`peak`].
+/// Steps in a response at least. For 4000 pulses with the noise of one crossing in 10⁴ responses, the times
+/// from 8 and from 16 steps differ by 0.008 of a response, rms, at the threshold, and by 0.004 at five times
+/// the threshold. Crossings between the steps are found, too, see [`peak`].
 const STEPS: f64 = 8.0;
 
-/// Steps in the memory of the noise at least: with as many it crosses the threshold within a percent as often as
-/// noise in finer steps does, the parabolas of [`peak`] included.
+/// Steps in the memory of the noise at least. Noise in such steps crosses the threshold as often as noise in
+/// finer steps, to a percent, the parabolas of [`peak`] included.
 const STEPS_OF_MEMORY: f64 = 4.0;
 
 /// A pulse is followed to where it is less than this share of the noise.
@@ -47,7 +47,7 @@ const TOGETHER: f64 = 1.0 / 8.0;
 /// Samples whose noise is drawn at once, of two numbers each.
 const BLOCK: usize = GROUP / 2;
 
-/// The smoothing of the noise is cut off at so many of its standard deviations.
+/// Standard deviations at which the smoothing of the noise is cut off.
 const CUT: f64 = 3.5;
 
 /// A linear detector that sums the pulses of all light.
@@ -55,7 +55,7 @@ const CUT: f64 = 3.5;
 pub(super) struct Waveform {
     linear: LinearSetting,
     comparator: Comparator,
-    /// Whether the height of a pulse is measured, as [`super::linear`] has it.
+    /// Set if the height of a pulse is measured, as in [`super::linear`].
     measures: bool,
     /// A step, fs.
     step_fs: i64,
@@ -84,7 +84,7 @@ struct Event {
     height: f64,
 }
 
-/// What the comparator does.
+/// The timing of the comparator.
 #[derive(Clone, Copy, PartialEq)]
 enum State {
     /// The signal has been below the hysteresis: the next crossing counts.
@@ -154,8 +154,8 @@ impl Waveform {
                 }
             }
         }
-        // By where they begin to be followed. Of several at once the order must not depend on what
-        // else is looked at.
+        // Sorted by the start of their waveform. The order of simultaneous ones must not depend on the
+        // others.
         pulses.sort_by_cached_key(|pulse| {
             (self.steps(pulse).0, pulse.peak_fs, pulse.height.to_bits())
         });
@@ -207,7 +207,7 @@ impl Waveform {
         let release = (1.0 - self.comparator.hysteresis) * threshold;
         let delay = self.delay as usize;
         let signal = &stretch.signal;
-        // What the delay lets through less the fraction of what comes in.
+        // The delayed signal less the fraction of the undelayed one.
         let fraction = |at: usize| {
             let ago = at.checked_sub(delay).map_or(0.0, |ago| signal[ago]);
             ago - COMPARATOR_FRACTION * signal[at]
@@ -248,9 +248,9 @@ impl Waveform {
     }
 }
 
-/// The highest that the signal is about a step: `now`, or if it is no less than `before` and `next`, the
-/// top of the parabola through all three. Of 4000 pulses at the threshold 7 to 13 in 1000 cross it
-/// between steps alone; the parabola and steps eight times as fine disagree about 1 or 2 in 1000.
+/// The highest value of the signal around a step: `now`, or if it is no less than `before` and `next`, the
+/// top of the parabola through all three. Of 4000 pulses at the threshold 7 to 13 in 1000 cross it between
+/// steps alone; the parabola and steps eight times as fine disagree about 1 or 2 in 1000.
 fn peak(before: f64, now: f64, next: f64) -> f64 {
     let bend = 2.0 * now - before - next;
     match before <= now && next <= now && bend > 0.0 {
@@ -334,8 +334,8 @@ struct Noise<'a> {
 impl Noise<'_> {
     /// Fills the noise of `length` steps from the first one of `stretch` on, of variance 1.
     ///
-    /// The independent numbers are how many of 64 random bits are set, less 32, over 4: their mean is
-    /// 0, their variance 1 and their excess −1/32, of which the smoothing leaves a tenth.
+    /// The independent numbers are the count of set bits among 64 random ones, less 32, over 4: their mean is
+    /// 0, their variance 1 and their excess −1/32. The smoothing leaves a tenth of that.
     fn smooth(&self, stretch: &mut Stretch, length: usize, kernel: &[f32]) {
         let from = stretch.first - (kernel.len() / 2) as i64;
         let block = BLOCK as i64;
@@ -378,8 +378,8 @@ mod tests {
     use crate::emit::{Band, bands};
     use crate::random::Chance;
 
-    /// Shots of so many marks, so many chips of 0.1 ns apart, behind an amplifier whose
-    /// response is 0.44 ns and which no noise but of 1 crossing a second disturbs.
+    /// Shots of `marks` marks, `gap` chips of 0.1 ns apart, behind an amplifier with a response of 0.44 ns
+    /// and the noise of 1 crossing a second.
     fn sensor(marks: u32, gap: u32, timing: &str) -> Design {
         let length = (marks - 1) * gap + 1;
         let text = format!(
@@ -394,8 +394,8 @@ mod tests {
         Design::from_toml(&text, "mine", std::path::Path::new(""), &[]).unwrap()
     }
 
-    /// Times of the events of the first shots, ns after each was fired, where each has an echo of so
-    /// many times the threshold at 500 ns.
+    /// Times of the events of the first shots, ns after each was fired, each with an echo of `over` times the
+    /// threshold at 500 ns.
     fn events(design: &Design, over: f64, shots: usize) -> Vec<Vec<f64>> {
         let noise = design.detector.model().noise(0.0).unwrap();
         let mut found = Vec::new();
@@ -444,8 +444,8 @@ mod tests {
         }
     }
 
-    /// N = 4000 pulses at each of four amplitudes about the threshold: as many events as the closed
-    /// form says, to within 4 standard deviations, and as precise, to within a tenth. Controls: a tenth
+    /// N = 4000 pulses at each of four amplitudes about the threshold: the number of events is that of the
+    /// closed form, to within 4 standard deviations, and their precision to within a tenth. Controls: a tenth
     /// more light, and the precision at twice the amplitude.
     #[test]
     fn pulses_are_seen_and_timed_as_forecast() {
@@ -473,7 +473,7 @@ mod tests {
         }
     }
 
-    /// What a band sees does not depend on the shots around it that are looked at as well.
+    /// The events of a band do not depend on the shots around it that are looked at as well.
     #[test]
     fn neighbouring_bands_see_the_same_events() {
         let design = Design::open("coded-practical", &[]).unwrap();

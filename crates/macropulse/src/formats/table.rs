@@ -9,8 +9,8 @@ use super::room::CloudRoom;
 use crate::points::{NO_OBJECT, Outcome, PointCloud, SATURATED, Storage, Surface, Surfaces, Truth};
 use std::collections::BTreeMap;
 
-/// Pixels that a cloud is given at most, so that a file that lies about its size costs no memory: as
-/// many as a sensor may have.
+/// Pixels of a cloud at most, so that a file that lies about its size costs no memory: the most that a sensor
+/// may have.
 const MOST_PIXELS: usize = 1 << 25;
 
 /// Rows and columns that 16 bits can number.
@@ -19,7 +19,7 @@ const MOST_ROWS: usize = 1 << 16;
 /// Bytes of the longest record that is read.
 const LONGEST_RECORD: usize = 1 << 20;
 
-/// Where one of our attributes lies in a record.
+/// Place of one of our attributes in a record.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     meaning: Meaning,
@@ -33,7 +33,7 @@ pub(super) struct Layout {
     fields: Vec<Field>,
     /// Names of the fields that are no attribute of ours.
     pub unknown: Vec<String>,
-    /// Whether the numbers were written as text, and have as many digits as that.
+    /// Set if the numbers were written as text, with the digits of that.
     is_text: bool,
     /// Bytes of a record.
     pub stride: usize,
@@ -279,7 +279,7 @@ impl Record {
         [Attribute::X, Attribute::Y, Attribute::Z].map(|place| self.get(place))
     }
 
-    /// What stands beside it of the truth.
+    /// The truth beside it.
     fn surface(&self) -> Surface {
         Surface {
             range: self.get(Attribute::TrueRange) as f32,
@@ -306,23 +306,23 @@ pub(super) enum Digits {
 /// A cloud that is being read.
 pub(super) struct Gathered {
     cloud: PointCloud,
-    /// What the points of the file have.
+    /// Attributes of the points of the file.
     attributes: Vec<Attribute>,
     digits: Digits,
     is_of_driver: bool,
     room: CloudRoom,
-    /// Whether there are more points than there is memory for.
+    /// Set if there are more points than there is memory for.
     is_full: bool,
     /// Points that are none.
     dropped: BTreeMap<NoPoint, u64>,
-    /// Whether the list has an image, and whether its size is still to be found.
+    /// The image of the list, and whether its size is still to be found.
     list: Option<List>,
     find_size: bool,
 }
 
 impl Gathered {
-    /// A list of points that have these `attributes`. Where the file does not tell the size of the
-    /// image, it is that of the highest row and column; a list without them has no image.
+    /// A list of points with these `attributes`. If the file does not tell the size of the image, it is that
+    /// of the highest row and column; a list without them has no image.
     ///
     /// # Errors
     /// If the image is larger than any sensor's.
@@ -465,8 +465,8 @@ impl Gathered {
         }
     }
 
-    /// The list, with the image that it has. Of the pixels without a return it says nothing, of the
-    /// others what it says of the return they show.
+    /// The list, with its image. It says nothing of pixels without a return; for each other pixel it has the
+    /// return that the pixel shows.
     ///
     /// # Errors
     /// If there is not the memory for all points.
@@ -522,7 +522,7 @@ impl Gathered {
     }
 }
 
-/// Whether the digits by which 32-bit floats are written are those of all `values`.
+/// Tells if 32-bit floats, as written, have the digits of all `values`.
 fn is_single(values: &[f64]) -> bool {
     let mut buffer = zmij::Buffer::new();
     values.iter().all(|&value| {

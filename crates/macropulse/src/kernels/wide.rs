@@ -1,5 +1,5 @@
-//! Numbers side by side: one operation on as many `f32` as a packet has rays, or as boxes lie side
-//! by side in a hierarchy.
+//! Numbers side by side: one operation on all `f32` of a packet of rays, or of the boxes that lie side by
+//! side in a hierarchy.
 
 use macropulse_codec::level::Level;
 
@@ -29,7 +29,7 @@ pub(super) trait Wide<const N: usize>: Copy {
     fn below(self, other: Self) -> u32;
 }
 
-/// What numbers are held in at one level.
+/// Registers that hold numbers at one level.
 pub(super) trait Registers {
     /// One for each ray of a packet.
     type Rays: Wide<LANES>;
@@ -66,7 +66,7 @@ pub(super) trait Registers {
     }
 }
 
-/// What is done with the widest registers there are.
+/// A task for the widest registers there are.
 pub(super) trait Task {
     /// It takes part in what a level has only if it is inlined.
     fn run<R: Registers>(&mut self);
@@ -115,7 +115,7 @@ pub(crate) fn fetch<T>(values: &[T], index: usize) {
     let _ = (values, index);
 }
 
-/// What any processor can do.
+/// The level of any processor.
 #[derive(Clone, Copy)]
 pub(super) struct Plain<const N: usize>([f32; N]);
 

@@ -1,8 +1,8 @@
 //! Returns to points: the cloud of one scan.
 //!
-//! A cloud is a list of returns. Each is named by its pixel and its number among the returns of that
-//! pixel's shot. What an organised image shows of it is a view, [`Image`]: one return of each pixel,
-//! the first, the strongest or the last one ([`Pick`]).
+//! A cloud is a list of returns. Each is named by its pixel and its number among the returns of that pixel's
+//! shot. An organised image is a view of it, [`Image`]: one return of each pixel, the first, the strongest or
+//! the last one ([`Pick`]).
 
 mod columns;
 mod image;
@@ -77,7 +77,7 @@ pub struct PointCloud {
     /// When the scan was taken, ns of Unix time, of a cloud whose file tells it; its times then count
     /// from there.
     pub stamp_ns: Option<u64>,
-    /// Where the sensor was when the scan began.
+    /// Place and attitude of the sensor at the start of the scan.
     pub viewpoint: Viewpoint,
     /// Rows of pixels; 0 where the list has no image.
     pub rows: usize,
@@ -87,7 +87,7 @@ pub struct PointCloud {
     pub returns_per_shot: u8,
     /// Which return of a pixel its image shows.
     pub pick: Pick,
-    /// Whether the sensor measures radial velocities: says of a cloud without returns whether it has their column.
+    /// Set if the sensor measures radial velocities: it tells if a cloud without returns has their column.
     pub has_speeds: bool,
     /// Row of the pixel.
     pub row: Vec<u16>,
@@ -108,8 +108,7 @@ pub struct PointCloud {
     /// Apparent reflectance, 1 = white Lambertian facing the sensor, by range, link and its own
     /// energy estimate ([`Scale`]), 10⁶ at most; a lower bound where it is `saturated`.
     pub intensity: Vec<f32>,
-    /// Whether the detector cannot tell how much light it was: no mark was missed, and no amplitude
-    /// is measured.
+    /// Set if the detector cannot tell the amount of light: no mark was missed, and no amplitude is measured.
     pub saturated: Vec<bool>,
     /// One-way range, m; rounded where [`PointCloud::exact`] has more digits.
     pub range: Vec<f32>,
@@ -130,7 +129,7 @@ pub struct PointCloud {
     /// For every pixel, whether it answered or not, the time at which its shot was fired, ns from
     /// the start of the scan; NaN where none was.
     pub fired_ns: Vec<f64>,
-    /// What is known from the scene; filled by the score stage, empty without it.
+    /// Values known from the scene; filled by the score stage, empty without it.
     pub truth: Truth,
 }
 
@@ -148,7 +147,7 @@ pub struct Exact {
     pub range: Vec<f64>,
 }
 
-/// Where the sensor was in the world when a scan began.
+/// Place and attitude of the sensor in the world at the start of a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Viewpoint {
     /// Position, m.
@@ -168,14 +167,14 @@ impl Default for Viewpoint {
 /// The truth beside a point cloud.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Truth {
-    /// Of every return, the surface it came from, or else the first one along the beam within the
-    /// range gate; and how the return came out.
+    /// For every return, the surface it came from, or else the first one along the beam within the range
+    /// gate; and its outcome.
     pub returns: Surfaces,
     /// How every pixel came out, by the return that its image shows; and of those without a return the
     /// first surface along the beam within the range gate.
     pub pixels: Surfaces,
-    /// Of every return, the radial velocity of the surface beside it, m/s, positive towards the sensor; NaN where there is
-    /// none. Empty of a sensor whose light does not show it.
+    /// For every return, the radial velocity of the surface beside it, m/s, positive towards the sensor; NaN
+    /// if there is none. Empty for a sensor whose light does not show it.
     pub radial_velocity: Vec<f32>,
 }
 
@@ -210,7 +209,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Where there is no surface, and no answer.
+    /// No surface, and no answer.
     pub const NONE: Self = Self {
         range: f32::NAN,
         object: NO_OBJECT,
@@ -251,7 +250,7 @@ impl Surfaces {
         self.outcome[at] = surface.outcome;
     }
 
-    /// Makes it so many lines of [`Surface::NONE`], in the memory of what was there.
+    /// Makes it `lines` lines of [`Surface::NONE`], in the memory of the old ones.
     pub(crate) fn blank(&mut self, lines: usize) {
         self.clear();
         let Surface { range, object, material, cosine, outcome } = Surface::NONE;
@@ -275,10 +274,10 @@ impl Surfaces {
 /// Flag of a return with fewer than half of its marks.
 pub const FAINT: u8 = 1;
 
-/// Flag of a return for which another lag had as many marks.
+/// Flag of a return with a rival: another lag had the same number of marks.
 pub const AMBIGUOUS: u8 = 2;
 
-/// Flag of a return of which every mark was found: its intensity is a lower bound.
+/// Flag of a return with all marks found: its intensity is a lower bound.
 pub const SATURATED: u8 = 4;
 
 /// Object and material index of a pixel that met nothing.
@@ -304,13 +303,13 @@ impl PointCloud {
         self.x.len()
     }
 
-    /// Whether a column of returns that has this many entries is there. All columns of a cloud without
-    /// returns are.
+    /// Tells if a column of returns with this many entries is there. All columns of a cloud without returns
+    /// are.
     pub fn has(&self, entries: usize) -> bool {
         entries > 0 || self.returns() == 0
     }
 
-    /// Whether the truth stands beside the measurement.
+    /// Tells if the truth stands beside the measurement.
     pub fn has_truth(&self) -> bool {
         !(self.truth.pixels.outcome.is_empty() && self.truth.returns.outcome.is_empty())
     }
@@ -360,7 +359,7 @@ impl PointCloud {
         Image::of(self, pick)
     }
 
-    /// What decides whether return `at` is the strongest of its shot.
+    /// The quantities that decide if return `at` is the strongest of its shot.
     pub(crate) fn strength(&self, at: usize) -> Strength {
         let peak = self.peak.get(at).copied().unwrap_or_default();
         // A file keeps no photons, but what follows from them.

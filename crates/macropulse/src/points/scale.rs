@@ -1,28 +1,28 @@
-//! From what a receiver measures of a return to reflectance.
+//! The scale of reflectance: from a receiver's measurement of a return to the reflectance of its surface.
 //!
 //! Intensity is the photons that a mark brought over those that a white surface seen square on would
 //! have brought from the same range. A receiver knows its range, by its own estimate, its link budget
 //! or the sensitivity it is declared by, the air, and the law of its own detector; of the scene it
 //! knows nothing.
 //!
-//! 1. An amplitude is photons as it stands, and so is what a receiver of samples finds.
-//! 2. A count of marks tells the share of them that made an event, as μ = −ln(1 − share). Of a
-//!    detector that every photon fires μ is the photons; of any other they are those n of which
-//!    its law gives that share, p(n) = 1 − exp(−μ): the law turned round.
-//! 3. Where no mark was missed the count tells a lower bound, and the return is flagged.
+//! 1. An amplitude is a number of photons, and so is the result of a receiver of samples.
+//! 2. A count of marks tells the share of them that made an event, as μ = −ln(1 − share). If every photon
+//!    fires the detector, μ is the photons. Any other detector gives that share for n photons,
+//!    p(n) = 1 − exp(−μ): its law is inverted.
+//! 3. If no mark was missed the count tells a lower bound, and the return is flagged.
 
 use crate::channel::{Link, Operating};
 use crate::design::Design;
 use crate::design::detector::Lit;
 use macropulse_codec::decode::Method;
 
-/// The law of a detector is asked for at so many photons, evenly spaced in their logarithm …
+/// Number of photon counts at which the law of a detector is tabulated, evenly spaced in their logarithm …
 const PLACES: i32 = 640;
 
 /// … from 10⁻³ …
 const LEAST: f64 = 1e-3;
 
-/// … on, by so many to a factor of e.
+/// … on, with this many to a factor of e.
 const PER_E: f64 = 40.0;
 
 /// The scale of intensity ends here. No material of a scene is brighter than 1.2·10⁵: a return of 10⁶ is
@@ -30,7 +30,7 @@ const PER_E: f64 = 40.0;
 /// view that follows the beam has moved on, and white would bring nothing.
 const BRIGHTEST: f64 = 1e6;
 
-/// What a receiver knows to tell reflectance by.
+/// A receiver's knowledge for reflectance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scale {
     link: Link,
@@ -46,8 +46,8 @@ impl Scale {
         Self { link: operating.link, law }
     }
 
-    /// Photons per mark of which a detector makes as many events as one that every photon fires makes
-    /// of `photons`.
+    /// Photons per mark from which the detector makes the same number of events as one that fires for each of
+    /// `photons`.
     #[inline]
     pub(super) fn detected(&self, photons: f32) -> f32 {
         match self.law.len().checked_sub(1) {
@@ -56,7 +56,7 @@ impl Scale {
         }
     }
 
-    /// The same by the law, of which the entry number `last` is the last one.
+    /// The same by the law, whose last entry has the number `last`.
     fn turned_round(&self, photons: f32, last: usize) -> f32 {
         if photons <= 0.0 {
             return 0.0;
@@ -89,8 +89,8 @@ impl Scale {
     }
 }
 
-/// ln μ and ln n, n the photons of which a mark makes an event with probability 1 − exp(−μ), where
-/// that is neither certain nor, by noise alone, nearly as likely without light; empty where μ is n.
+/// ln μ and ln n, n the photons with which a mark makes an event with probability 1 − exp(−μ), as long as
+/// that is neither certain nor, by noise alone, nearly as likely without light; empty if μ is n.
 fn law(design: &Design, operating: &Operating) -> Vec<(f64, f64)> {
     let detector = design.detector.model();
     let (background, falling) = (operating.background, operating.false_rate);
@@ -132,13 +132,12 @@ mod tests {
         let (_, scale) = scale("kim-park-2016", &[]);
         assert!(scale.law.is_empty());
         assert_eq!([0.0, 1.7].map(|photons| scale.detected(photons)), [0.0, 1.7]);
-        // 4.605 photons from white at 150 m, four times as many from half as far.
+        // 4.605 photons from white at 150 m, and four times that number from half the range.
         assert_relative_eq!(scale.reflectance(4.605_17, 150.0), 1.0, max_relative = 1e-6);
         assert_relative_eq!(scale.reflectance(4.605_17, 75.0), 0.25, max_relative = 1e-6);
     }
 
-    /// Where a tenth of the marks is lost whatever the light, 0.9·(1 − e⁻²) of them are seen of two
-    /// photons.
+    /// If a tenth of the marks is lost whatever the light, 0.9·(1 − e⁻²) of them are seen with two photons.
     #[test]
     fn marks_that_are_lost_otherwise_are_not_taken_for_darkness() {
         let key = "detector.photon-counting.missed_marks";

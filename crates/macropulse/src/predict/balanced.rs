@@ -1,9 +1,9 @@
-//! What the balanced receiver makes of ticks, in closed form.
+//! Closed form of the balanced receiver's findings in ticks.
 //!
-//! It takes as given how many chips are lit about each lag, and leaves to chance how many of them are
-//! marks (`balanced::chance` of the codec): X marks and Y dark chips of N and M are believed if
-//! X − Y ≥ n* and L(n*)·P(X' ≥ X) ≤ α, X' hypergeometric, L(n) the lags about which at least n chips
-//! are lit, n* the least n with L(n)·P(X' = n) ≤ α.
+//! It takes the number of lit chips about each lag as given, and leaves to chance how many of them are marks
+//! (`balanced::chance` of the codec). X marks and Y dark chips out of N and M are believed if X − Y ≥ n* and
+//! L(n*)·P(X' ≥ X) ≤ α. X' is hypergeometric, L(n) the number of lags about which at least n chips are lit,
+//! and n* the least n with L(n)·P(X' = n) ≤ α.
 //!
 //! Here L(n) is its mean. Shots leave on the chip clock, so those that meet the same range light the same
 //! few phases of it: L(n) = Σ_φ L_φ·P(Bin(N + M, d_φ) ≥ n), d_φ the share of places lit in a phase, and the
@@ -20,8 +20,7 @@ use super::matched::{Chances, Found, Lone, Place, lags};
 use crate::design::Design;
 use crate::units::s_from_fs;
 
-/// What comes of shots by the marks of labels, of which so many have so many; all of them come back
-/// after `tof` seconds.
+/// The findings for shots, by the number of marks of their labels; all of them come back after `tof` seconds.
 pub(super) fn chances(
     design: &Design,
     correlation: &Correlation,
@@ -41,7 +40,7 @@ pub(super) fn chances(
             (0..).zip(&of_lit).map(|(k, chance)| f64::from(k) / marks as f64 * chance).collect();
         pd += share * threshold.passed(&beyond(&of_lit), found.false_density);
         share_found += share * threshold.passed(&beyond(&shares), found.false_density);
-        // Where nothing is, a lag may be lit by other shots as well as by noise.
+        // In an empty gate a lag may be lit by other shots as well as by noise.
         let of_nothing = gate.phases.iter().map(|phase| {
             phase.lags * threshold.passed(&beyond(&binomial(marks, phase.density)), phase.density)
         });
@@ -62,14 +61,14 @@ struct Phase {
     density: f64,
 }
 
-/// What the threshold depends on.
+/// The quantities behind the threshold.
 struct Gate {
     /// Chips of a macropulse.
     chips: usize,
     /// False returns accepted.
     false_alarm: f64,
     phases: Vec<Phase>,
-    /// Lags about which at least so many chips are lit, by number of chips.
+    /// Number of lags about which at least n chips are lit, by n.
     as_lit: Vec<f64>,
 }
 
@@ -95,7 +94,7 @@ impl Gate {
         Self { chips, false_alarm: correlation.false_alarm, phases, as_lit }
     }
 
-    /// What so many marks must come to.
+    /// The threshold for a label of this number of `marks`.
     fn threshold(&self, marks: usize) -> Threshold {
         let words = (marks as u32, self.chips.saturating_sub(marks) as u32);
         let all = |lit: usize| hypergeometric_tail(words, lit as u32, lit as u32);
@@ -140,21 +139,21 @@ fn phases(
     in_step.chain([noise]).collect()
 }
 
-/// What so many marks must come to.
+/// The conditions for belief in a label with a given number of marks.
 struct Threshold {
     /// Marks and dark chips.
     words: (u32, u32),
     /// The least balance.
     balance: usize,
-    /// How likely chance may be to leave as many marks at one lag.
+    /// Largest accepted probability that chance leaves this number of marks at one lag.
     chance: f64,
     /// The fewest marks, by lit dark chips; as far as they are known.
     least: Vec<usize>,
 }
 
 impl Threshold {
-    /// The sum over lit dark chips, each of which is lit with probability `density`, of the entry of `tails` at the
-    /// fewest marks that are believed.
+    /// The sum, over lit dark chips that are lit with probability `density` each, of the entry of `tails` at
+    /// the fewest marks that are believed.
     fn passed(&mut self, tails: &[f64], density: f64) -> f64 {
         let mut sum = 0.0;
         for (stray, chance) in binomial(self.words.1 as usize, density).into_iter().enumerate() {
@@ -169,12 +168,11 @@ impl Threshold {
         sum
     }
 
-    /// The fewest marks that are believed where so many dark chips are lit; more than there are if none
-    /// will do.
+    /// The fewest marks that are believed beside `stray` lit dark chips; more than there are if none will do.
     fn least(&mut self, stray: usize) -> usize {
         while self.least.len() <= stray {
             let stray = self.least.len();
-            // Where more dark chips are lit, more marks are needed.
+            // More lit dark chips need more marks.
             let before = self.least.last().map_or(self.balance, |least| least + 1);
             let from = before.max(self.balance + stray);
             let is_rare = |found: &usize| {
@@ -207,7 +205,7 @@ fn beyond(chances: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Of 64 marks among 127 chips, by hand: Π_i<n (64 − i)/(127 − i) is 2.65e-11 at n = 29.
+    /// By hand, for 64 marks among 127 chips: Π_i<n (64 − i)/(127 − i) is 2.65e-11 at n = 29.
     #[test]
     fn the_least_balance_is_that_of_fractions() {
         let all =

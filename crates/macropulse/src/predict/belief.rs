@@ -1,13 +1,13 @@
-//! What the thorough matched receiver makes of ticks, in closed form.
+//! Closed form of the thorough matched receiver's findings in ticks.
 //!
-//! It believes in a shot if evidence and prior reach a threshold, [`belief`]. Of N marks k ~ Bin(N, p) are lit. All shots
-//! meet the same range. Two things depend on which other shots are found:
+//! It believes in a shot if evidence and prior reach a threshold, [`belief`]. Of N marks, k ~ Bin(N, p) are
+//! lit. All shots meet the same range. Two things depend on which other shots are found:
 //!
 //! * **Neighbours.** A return beside a shot makes its lag likelier. With F, the share of all shots that are fuller and
 //!   found, one of the M shots that are asked is a neighbour with the probability 1 − (1 − F)^M.
 //! * **Light of other shots** in the gate is explained if they are fuller and found. The rest of it is chance, as noise is.
 //!
-//! So shots are gone through in the order of their fullness, as the receiver judges them.
+//! So the shots are taken in the order of their fullness, as the receiver judges them.
 
 use std::collections::BTreeMap;
 
@@ -28,19 +28,20 @@ const PART: f64 = 0.02;
 /// neighbours lead on to those that light of others would hide.
 const AT_EDGES: f64 = 1e-2;
 
-/// Shots of which fewer are as full do not count.
+/// Fullnesses with a smaller share of the shots do not count.
 const SELDOM: f64 = 1e-9;
 
-/// Fewest ticks of a lump: where all shots have as many marks, ticks are more even than Poisson's law has them.
+/// Fewest ticks of a lump: if all shots have the same number of marks, ticks are more even than Poisson's law
+/// has them.
 const SMALLEST_LUMP: f64 = 0.1;
 
-/// Of more lumps the number is normal.
+/// A larger number of lumps is taken as normally distributed.
 const MANY_LUMPS: f64 = 100.0;
 
 /// Numbers of ticks that stand for all that Poisson's law gives.
 const NODES: usize = 12;
 
-/// What the shots of a sensor meet, and the numbers that the rule of belief takes.
+/// The surroundings of the shots of a sensor, and the numbers that the rule of belief takes.
 struct Gate {
     /// Ticks that the light of a shot takes up.
     length: f64,
@@ -77,7 +78,7 @@ impl Level {
 /// Ticks of a shot that no return explains.
 struct Hidden {
     mean: f64,
-    /// Of their square.
+    /// Mean of the square of their number.
     mean_square: f64,
 }
 
@@ -103,7 +104,7 @@ impl Hidden {
 
 /// Shots that meet the same range.
 pub(super) struct Shots<'a> {
-    /// How many labels have so many marks.
+    /// Number of labels by their number of marks.
     pub weights: &'a BTreeMap<usize, usize>,
     /// Shots that may lead to expect light of one, on average.
     pub neighbours: f64,
@@ -131,7 +132,7 @@ pub(super) fn neighbours(design: &Design) -> f64 {
     decode::neighbours(&log)
 }
 
-/// What comes of `shots`.
+/// The findings for `shots`.
 pub(super) fn chances(design: &Design, correlation: &Correlation, shots: &Shots) -> Chances {
     let weights = shots.weights;
     let mut levels = Vec::new();
@@ -196,9 +197,9 @@ impl Gate {
         let needed = [alone, beside].map(|prior| threshold - libm::log(prior));
         let lit = shots.false_density.min(0.999);
         let false_ticks = -libm::expm1(libm::log1p(-lit) / ticks);
-        // With a tick of light in a share s of the places, and false ones in a share D of them, which d ticks a tick
-        // are, a place has s + (W − s)·d ticks and is lit with the probability s + D − s·D. Where each photon makes an
-        // event of its own, ticks about a mark do not count.
+        // With a tick of light in a share s of the places, and false ones in a share D of them, which d ticks
+        // a tick are, a place has s + (W − s)·d ticks and is lit with the probability s + D − s·D. If each
+        // photon makes an event of its own, ticks about a mark do not count.
         let of_light = (1.0 - (1.0 - shots.seen.share(1.0)) / (1.0 - lit)).max(0.0);
         let (zone, surplus) = match correlation.photons_apart {
             true => (ticks + 2.0 * (ticks / 2.0).floor(), 0.0),
@@ -207,8 +208,8 @@ impl Gate {
         Self { length, places, ticks, zone, false_ticks, surplus, others, needed }
     }
 
-    /// Probabilities that shots of a `level` are believed without a neighbour and with one, where of other shots so much
-    /// is `hidden`.
+    /// Probabilities that shots of a `level` are believed without a neighbour and with one, if the light of
+    /// other shots in `hidden` is not explained.
     fn believed(&self, level: &Level, hidden: &Hidden) -> [f64; 2] {
         let [in_gate, about] = self.others;
         let ticks = |time: f64, own: f64, shots: f64| {

@@ -1,11 +1,11 @@
 //! The best of the lags about the light of a shot.
 //!
-//! A mark is looked for in W ticks in a row, so light is seen at several lags, and a receiver takes the one that shows
-//! most. With the probability p_i a mark is seen at lag i, with p_ij at both i and j. Of N marks A are seen at i alone, and
-//! B at j alone, nearly by Poisson's law with the means N·(p_i − p_ij) and N·(p_j − p_ij). So lag j adds
-//! E\[(B − A)⁺\] marks to those of lag i. Lag by lag the greatest count so far takes the place of i: of it the mean, the
-//! variance and the covariances with the other lags are kept, which give the mean and the variance of B − A, and so the
-//! means of both, as Clark did with normal variables \[Cla61\].
+//! A mark is looked for in W ticks in a row, so light is seen at several lags, and a receiver takes the one
+//! that shows most. With the probability p_i a mark is seen at lag i, with p_ij at both i and j. A of N marks
+//! are seen at i alone, and B at j alone, nearly by Poisson's law with the means N·(p_i − p_ij) and N·(p_j −
+//! p_ij). So lag j adds E\[(B − A)⁺\] marks to those of lag i. Lag by lag the greatest count so far takes the
+//! place of i. Its mean, its variance and its covariances with the other lags are kept. They give the mean
+//! and the variance of B − A, and so the means of both, as Clark did with normal variables \[Cla61\].
 
 use macropulse_codec::statistics::{normal_tail, poisson_from};
 
@@ -13,7 +13,7 @@ use super::matched::{Timing, seen_of_share};
 use crate::design::Design;
 use crate::design::detector::Lit;
 
-/// Where a mark of a shot is seen.
+/// Lags at which a mark of a shot is seen.
 pub(super) struct Sight {
     /// When its light comes, in ticks from the beginning of a tick, 0 to 1.
     pub late: f64,
@@ -50,8 +50,8 @@ impl BestLag {
         Self::seen_by(width, light, libm::log1p(-sight.density.min(0.999_999)) / width as f64)
     }
 
-    /// Those of light that is seen from one tick to another with the probability `light`, in places of so many ticks, of
-    /// which other light leaves each dark with a probability of this logarithm.
+    /// The sights of light that is seen from one tick to another with the probability `light`, in places of
+    /// `width` ticks, each left dark by other light with a probability of this logarithm.
     fn seen_by(width: i64, light: impl Fn(i64, i64) -> f64, log_dark: f64) -> Self {
         let within = |from: i64, to: i64| {
             1.0 - (1.0 - light(from, to)) * libm::exp(log_dark * (to - from) as f64)
@@ -74,7 +74,7 @@ impl BestLag {
         Self { lags, seen, both }
     }
 
-    /// The mean share of so many marks that are seen at the best lag.
+    /// The mean share of `marks` that are seen at the best lag.
     pub fn share(&self, marks: f64) -> f64 {
         self.best_of(marks).0
     }
@@ -97,8 +97,8 @@ impl BestLag {
         each.iter().map(|(own, _)| agrees(*own)).fold(0.0, f64::max)
     }
 
-    /// The mean share of so many marks at the best lag, and the probability of each lag to be that one. Of lags with as
-    /// many marks it is the first.
+    /// The mean share of `marks` at the best lag, and the probability of each lag to be that one. The first
+    /// wins if several have the same number.
     fn best_of(&self, marks: f64) -> (f64, Vec<f64>) {
         let covariance = |one: usize, other: usize| {
             marks * (self.both[one][other] - self.seen[one] * self.seen[other])
@@ -129,16 +129,17 @@ impl BestLag {
     }
 }
 
-/// Lags at most. Of more, those side by side show nearly the same marks, and one stands for several.
+/// Lags at most. Beyond that number, lags side by side show nearly the same marks, and one stands for
+/// several.
 const MOST_LAGS: i64 = 64;
 
 /// Lags that are more seldom the best do not count.
 const SELDOM: f64 = 1e-3;
 
-/// Of more marks the sums are those of normal variables.
+/// For more marks the sums are those of normal variables.
 const MANY: f64 = 100.0;
 
-/// What marks that are seen at another lag add.
+/// Marks that another lag adds.
 struct Gain {
     /// E\[(B − A)⁺\].
     marks: f64,

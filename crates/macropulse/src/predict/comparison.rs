@@ -73,8 +73,8 @@ impl Comparison {
         }
     }
 
-    /// `users` of the family at once; `None` where it has not so many words. Where words differ in
-    /// weight, the one received is the lightest.
+    /// `users` of the family at once; `None` if it has fewer words. If words differ in weight, the one
+    /// received is the lightest.
     pub fn users(&self, users: u32) -> Option<MultipleAccess> {
         (users as usize <= self.family.count()).then(|| self.access.with_users(users))
     }
@@ -86,7 +86,7 @@ impl Comparison {
     }
 }
 
-/// Mean and variance of values of which there are so many of each.
+/// Mean and variance of values, from the number of each.
 fn spread(counts: &[u64]) -> (f64, f64) {
     let all = counts.iter().sum::<u64>() as f64;
     let moment = |power: i32| {

@@ -1,4 +1,4 @@
-//! What the bank of converters loses, in closed form.
+//! Events that the bank of converters loses, in closed form.
 
 use macropulse_codec::statistics::erlang_b;
 

@@ -1,7 +1,7 @@
-//! What a scan will measure of a target at one range, in closed form.
+//! The forecast of a scan for a target at one range, in closed form.
 //!
-//! The target is extended, Lambertian and square on, and so is all around it: the light of the
-//! other shots in flight is that of the same target. The beam is a line.
+//! The target is extended, Lambertian and square on, and fills the surroundings: the light of the other shots
+//! in flight comes from it too. The beam is a line.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -31,9 +31,9 @@ pub enum Error {
     NotModelled {
         /// The sensor.
         sensor: String,
-        /// What has no closed form.
+        /// The effect without a closed form.
         what: String,
-        /// What to do instead.
+        /// A way to get an answer all the same.
         remedy: String,
     },
 }
@@ -49,7 +49,7 @@ pub struct Forecaster<'a> {
     operating: Operating,
     /// Mean time between shots of the same detector, s.
     channel_period: f64,
-    /// How many macropulses have so many marks, dark ones left out.
+    /// Number of macropulses by their number of marks, dark ones left out.
     weights: BTreeMap<usize, usize>,
     mean_weight: f64,
     /// Shots that may lead a matched receiver to expect light of one, on average.
@@ -58,11 +58,11 @@ pub struct Forecaster<'a> {
     sidelobes: Option<Sidelobes>,
     /// The points of the sums over noise, of a receiver of samples; empty of the others.
     points: Arc<[sampled::Points]>,
-    /// Of a receiver of histograms.
+    /// For a receiver of histograms.
     counting: Option<histogram::Counting>,
-    /// Of a receiver of taps.
+    /// For a receiver of taps.
     phases: Option<phase::Phases>,
-    /// Of a receiver of beats.
+    /// For a receiver of beats.
     beats: Option<Arc<beat::Beats>>,
     /// Factor on the light of the sensor.
     light: f64,
@@ -70,10 +70,10 @@ pub struct Forecaster<'a> {
     background: f64,
 }
 
-/// Fewer returns than one in so many shots have no precision.
+/// A precision needs at least one return in this number of shots.
 const FEWEST: f64 = 1e6;
 
-/// What is to be expected of a target.
+/// Expected measurements of a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forecast {
     /// Range, m.
@@ -106,8 +106,8 @@ pub struct Forecast {
     /// Returns that lie on a sidelobe of their own macropulse, where neighbours tell which of several as
     /// high ones is the peak; `None` without a matched receiver, and where there is no precision.
     pub aside: Option<Aside>,
-    /// The least that any unbiased estimate could have from as many photons, m: c/2·σ/√n, σ the
-    /// rms length of a micropulse with the jitter.
+    /// The least deviation of any unbiased estimate from the same number of photons, m: c/2·σ/√n, σ the rms
+    /// length of a micropulse with the jitter.
     pub bound: f64,
 }
 
@@ -172,24 +172,23 @@ impl<'a> Forecaster<'a> {
         self.design
     }
 
-    /// What follows from it and its environment.
+    /// The quantities that follow from the sensor and its environment.
     pub fn operating(&self) -> &Operating {
         &self.operating
     }
 
-    /// The same with so many times the light.
+    /// The same forecaster with `factor` times the light.
     pub fn with_light(&self, factor: f64) -> Self {
         Self { light: self.light * factor, ..self.clone() }
     }
 
-    /// The same with so many times the dark and background counts.
+    /// The same forecaster with `factor` times the dark and background counts.
     pub fn with_background(&self, factor: f64) -> Self {
         Self { background: self.background * factor, ..self.clone() }
     }
 
-    /// What it will measure of a target of `reflectance` at `range` metres. Where speckle is simulated
-    /// probabilities are the mean over the brightness of an echo, and precision that over the echoes that are
-    /// seen.
+    /// The forecast for a target of `reflectance` at `range` metres. If speckle is simulated, probabilities
+    /// are the mean over the brightness of an echo, and precision is that over the echoes that are seen.
     pub fn forecast(&self, reflectance: f64, range: f64) -> Forecast {
         let told = self.own_light(range).map(|own| own.told_at(range));
         self.of_told(reflectance, range, told.as_deref().unwrap_or_default())
@@ -201,7 +200,8 @@ impl<'a> Forecaster<'a> {
     pub fn worst(&self, reflectance: f64, farthest: f64) -> Forecast {
         let mut worst = self.forecast(reflectance, farthest);
         let Some(own) = self.own_light(farthest) else { return worst };
-        // Of two ranges at which as many marks are told the farther one has less light.
+        // Two ranges at which the same numbers of marks are told differ only in light: the farther one has
+        // less.
         let mut looked_at = BTreeSet::new();
         for (range, told) in own.each_change(self.design.scan.min_range, farthest) {
             let mut sorted = told.clone();
@@ -224,7 +224,7 @@ impl<'a> Forecaster<'a> {
         }
     }
 
-    /// What the channels are blind with, if they are sampled, for echoes from so many metres at most.
+    /// The light that blinds the channels of a sampled sensor to echoes from up to `farthest` metres.
     fn own_light(&self, farthest: f64) -> Option<OwnLight> {
         let (detector, settings) = self.sampled()?;
         let background = self.background * self.operating.background;
@@ -232,7 +232,8 @@ impl<'a> Forecaster<'a> {
         Some(OwnLight::of(self.design, blind, tof_from_range(farthest)))
     }
 
-    /// The same where of some shots so many marks each are `told`, which only receivers of samples ask.
+    /// The same forecast if the shots have the numbers of marks in `told`. Only receivers of samples use
+    /// these.
     fn of_told(&self, reflectance: f64, range: f64, told: &[usize]) -> Forecast {
         let mean = self.of_brightness(reflectance, range, told);
         let Some(speckle) = Speckle::simulated(self.design) else { return mean };
@@ -294,8 +295,7 @@ impl<'a> Forecaster<'a> {
         let events = -libm::expm1(-(false_events + own) * tick) / tick;
         let loss = design.bank().map_or(0.0, |share| bank_loss(&share, events));
         let place = matched::Place::of(design, &mark);
-        // Where the bank is overrun, all is lit until the last converter is taken: what is lost
-        // then makes the rest no clearer.
+        // An overrun bank stays lit until the last converter is taken: losing the rest makes it no clearer.
         let density = -libm::expm1(-(false_events + own) * place.width);
         let seen = place.seen(design, &mark) * (1.0 - loss);
         // Shots that meet the same range overlap where a macropulse is longer than the time to the next.
@@ -377,8 +377,8 @@ impl<'a> Forecaster<'a> {
         }
     }
 
-    /// Photons that fall on the detector of a mark of which `detected` are on average. Of light without end
-    /// no more than one for each cell makes it fire.
+    /// Photons of a mark that fall on the detector, if `detected` of them are detected on average. With light
+    /// without end, each cell fires for one photon at most.
     fn falling_of(&self, detected: f64) -> f64 {
         match &self.design.detector {
             _ if detected.is_finite() => detected,
@@ -387,7 +387,7 @@ impl<'a> Forecaster<'a> {
         }
     }
 
-    /// What a receiver of samples will measure of a target of `reflectance` at `range` metres. Its noise is
+    /// The forecast of a receiver of samples for a target of `reflectance` at `range` metres. Its noise is
     /// that of the amplifier and of steady light; `background` counts for that.
     fn of_samples(
         &self,
@@ -424,8 +424,8 @@ impl<'a> Forecaster<'a> {
         }
     }
 
-    /// What a receiver of histograms will measure of a target of `reflectance` at `range` metres: nothing of one
-    /// whose light comes after the last bin. `background` counts for sunlight and dark counts.
+    /// The forecast of a receiver of histograms for a target of `reflectance` at `range` metres. A target
+    /// whose light comes after the last bin is never found. `background` counts for sunlight and dark counts.
     fn of_histograms(
         &self,
         counting: &histogram::Counting,
@@ -457,8 +457,8 @@ impl<'a> Forecaster<'a> {
         }
     }
 
-    /// What is measured of a target, its reflectance and range, m, where so many photons of a shot without pulses are
-    /// `detected`, which has these `chances`.
+    /// The forecast of a sensor without pulses for a target of this reflectance and range, m: `detected`
+    /// photons of a shot and the resulting `chances`.
     fn without_pulses(
         &self,
         (reflectance, range): (f64, f64),
@@ -530,8 +530,8 @@ impl<'a> Forecaster<'a> {
 /// Ranges that are tried for the farthest one at which a target is seen that is not seen at the nearest.
 const PLACES: i32 = 64;
 
-/// Brightnesses of an echo of so many speckle `cells`, M, in its mean, and the share of each, of the gamma
-/// distribution M^M·x^(M − 1)·exp(−M·x)/Γ(M).
+/// Brightnesses of an echo of `cells` speckle cells, M, in units of its mean, and the share of each. They
+/// follow the gamma distribution M^M·x^(M − 1)·exp(−M·x)/Γ(M).
 ///
 /// Its cube root is nearly normal with the mean 1 − 1/9M and the deviation 1/(3·√M) \[WH31\]: in steps of half
 /// a deviation, to four of them, the density of that is summed.
@@ -548,7 +548,8 @@ fn brightnesses(cells: f64) -> Vec<(f64, f64)> {
     each.into_iter().map(|(brightness, share)| (brightness, share / all)).collect()
 }
 
-/// What of `design` where it is `operating` has no closed form, and what to do instead.
+/// The first property of `design` or of its `operating` point without a closed form, and a way to get an
+/// answer all the same.
 fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, String)> {
     let method = &design.receiver.method;
     if let (Method::Histogram(_), Detector::Geiger(geiger)) = (method, &design.detector) {
@@ -616,8 +617,8 @@ fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, Strin
     })
 }
 
-/// Whether the sensor's own marks pull the baseline of a sampled `detector` below the lowest code: above
-/// that a receiver that knows the coupling adds to the samples what it took from them.
+/// Tells if the sensor's own marks pull the baseline of a sampled `detector` below the lowest code. Above
+/// that code, a receiver that knows the coupling adds the lost level to the samples again.
 fn sunk(design: &Design, detector: &Sampled, background: f64) -> Option<(String, String)> {
     let deepest = sampled::deepest_baseline(design, detector);
     let room = detector.below_zero();
@@ -637,8 +638,8 @@ fn sunk(design: &Design, detector: &Sampled, background: f64) -> Option<(String,
 /// So many standard deviations of the noise must have room below the baseline.
 const SEEN_BELOW: f64 = 4.0;
 
-/// The least number from `low` to `high` of which `holds` is true, to a part in a million, if it
-/// is false below and true above; `None` where it is not even true of `high`.
+/// The least number from `low` to `high` for which `holds` is true, to a part in a million, if it is false
+/// below and true above; `None` if it is false even for `high`.
 fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
     if holds(low) {
         return Some(low);

@@ -1,4 +1,4 @@
-//! What other lidars do to a receiver, where it is simple.
+//! Effects of other lidars on a receiver, in simple cases.
 
 use crate::units::{range_from_tof, tof_from_range};
 

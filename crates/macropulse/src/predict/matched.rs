@@ -11,8 +11,7 @@ use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs};
 /// Terms of the sum over harmonics of a tick.
 const HARMONICS: u32 = 16;
 
-/// Jitter, in ticks, of which hardly any event is farther than a tick from the others: ±½ tick is
-/// ±2 σ.
+/// Jitter, in ticks, with which hardly any event is farther than a tick from the others: ±½ tick is ±2 σ.
 const NARROW: f64 = 0.25;
 
 /// Steps in an rms length of a micropulse that are as good as more: a Gaussian in steps of half of it is as
@@ -22,7 +21,7 @@ const FINE: f64 = 64.0;
 /// Places in half a tick over which an error is averaged.
 const PHASES: u32 = 12;
 
-/// Where the receiver looks for a mark.
+/// Ticks in which the receiver looks for a mark.
 pub(super) struct Place {
     /// How long it looks, s.
     pub width: f64,
@@ -80,13 +79,13 @@ pub(super) fn ticks_lit(design: &Design, mark: &Lit) -> f64 {
     let below = |place: f64| normal_tail(-place / width);
     let share = |tick: f64| below(tick + 0.5) - below(tick - 0.5);
     let pd = |tick: f64| pd_of_share(design, mark, share(tick));
-    // Of a pulse of many ticks one in so many stands for those about it.
+    // In a pulse of many ticks, one tick of every `every` stands for those about it.
     let every = (width / FINE).ceil().max(1.0);
     let farthest = (4.0 * 2_f64.sqrt() * width / every).ceil() as i32;
     (-farthest..=farthest).map(|step| pd(f64::from(step) * every)).sum::<f64>() * every
 }
 
-/// What a receiver finds in a gate.
+/// Findings of a receiver in a gate.
 #[derive(Clone, Copy)]
 pub(super) struct Found {
     /// Probability that a mark of the shot is found.
@@ -95,7 +94,7 @@ pub(super) struct Found {
     pub false_density: f64,
 }
 
-/// What comes of shots, the mean over labels.
+/// Findings for shots, the mean over labels.
 pub(super) struct Chances {
     /// Probability of a return from a lit shot.
     pub pd: f64,
@@ -130,7 +129,7 @@ pub(super) struct Timing {
     pub sigma: f64,
     /// Length of a tick, s.
     tick: f64,
-    /// Whether the receiver knows of jitter that leaves the events in two ticks.
+    /// Set if the receiver knows of jitter that leaves the events in two ticks.
     undoes_rounding: bool,
 }
 
@@ -166,7 +165,7 @@ impl Timing {
             let m = f64::from(m) * PI;
             libm::exp(-4.0 * (m * self.sigma).powi(2)) / (2.0 * m * m)
         };
-        // What lies beyond the harmonics that are summed, where they do not die out by themselves.
+        // The rest beyond the harmonics that are summed, if they do not die out by themselves.
         let common: f64 = match self.sigma {
             0.0 => 1.0 / 12.0,
             _ => (1..=HARMONICS).map(harmonic).sum(),

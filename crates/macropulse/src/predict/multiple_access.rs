@@ -49,8 +49,8 @@ impl MultipleAccess {
         Ok(Self::new(Family::prime(p)?.weight(), users, Hits::prime(p, words)))
     }
 
-    /// `users` of a code with these `words`, compared each with every other one. Where they differ
-    /// in weight, the one received is the lightest, which is filled first.
+    /// `users` of a code with these `words`, compared each with every other one. If they differ in weight,
+    /// the one received is the lightest, which is filled first.
     pub fn of_words(words: &[CodeWord], users: u32) -> Self {
         let lightest = words.iter().map(CodeWord::weight).min().unwrap_or(0);
         Self::new(lightest, users, Hits::of_words(words))
@@ -78,8 +78,8 @@ impl MultipleAccess {
     }
 }
 
-/// Probabilities q₀, q₁ … q_λ that an interferer adds so many marks to the count of a receiver, its
-/// own bit being dark half of the time.
+/// Probabilities q₀, q₁ … q_λ that an interferer adds 0, 1 … λ marks to the count of a receiver, its own bit
+/// being dark half of the time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hits {
     chances: Vec<f64>,
@@ -156,7 +156,7 @@ impl Hits {
         Self::new(if chances.is_empty() { vec![1.0] } else { chances })
     }
 
-    /// As words that share 0, 1 … λ marks at so many lags each.
+    /// The probabilities for words that share 0, 1 … λ marks at `counts` lags each.
     pub(super) fn of_counts(counts: &[u64]) -> Self {
         let all = counts.iter().sum::<u64>() as f64;
         // The bit of the interferer is dark half of the time.
@@ -165,7 +165,7 @@ impl Hits {
         Self::new(std::iter::once(none).chain(lit).collect())
     }
 
-    /// q_`marks`; 0 where so many are never met.
+    /// q_`marks`; 0 for more marks than are ever met.
     pub fn chance(&self, marks: usize) -> f64 {
         self.chances.get(marks).copied().unwrap_or(0.0)
     }

@@ -8,11 +8,11 @@ use macropulse_codec::decode::Sampling;
 use crate::design::{Design, Detector};
 use crate::units::{FS_PER_S, range_from_tof, s_from_fs, tof_from_range};
 
-/// Shots of a channel of which it is told which marks are hidden: six times the words of the example.
+/// Number of shots of a channel whose hidden marks are counted: six times the words of the example.
 pub const SHOTS: usize = 60;
 
-/// Ticks about a mark that a channel sends in which it tells nothing: from so many before the mark leaves to so
-/// many behind it.
+/// Ticks around a mark of a channel in which the channel is blind: the number before the mark leaves, and the
+/// number after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Blind {
     before: i64,
@@ -20,12 +20,12 @@ pub struct Blind {
 }
 
 impl Blind {
-    /// However bright the stray light of the mark is; `None` where the receiver is never blind.
+    /// The blind time for stray light of any brightness; `None` if the receiver is never blind.
     pub fn at_most(sampling: &Sampling) -> Option<Self> {
         Self::of(sampling, f64::INFINITY)
     }
 
-    /// Of stray light that shows from `shows` ticks before its mark on.
+    /// The blind time for stray light that shows from `shows` ticks before its mark on.
     ///
     /// The receiver takes samples for dark ones from the one before the first that is lit, of those that its
     /// filter reaches, to the last of `blank_ticks`. No mark is told within [`Sampling::core`] of these.
@@ -51,11 +51,12 @@ impl Blind {
     }
 }
 
-/// By what factor the stray light of the sensor's own marks may be stronger and still be over when the channel
-/// listens again. Below 1 the receiver takes the end of that light for an echo, in every shot. `None` of a receiver
-/// that takes no samples, or never stops listening.
+/// Factor by which the stray light of the sensor's own marks may be stronger and still be over when the
+/// channel listens again. Below 1 the receiver takes the end of that light for an echo, in every shot. `None`
+/// for a receiver that takes no samples, or never stops listening.
 ///
-/// A channel listens again when its marks are no longer blanked. Where each shot is alone, its gate may open later.
+/// A channel listens again when its marks are no longer blanked. If each shot is alone, its gate may open
+/// later.
 pub fn stray_room(design: &Design) -> Option<f64> {
     let Detector::Sampled(detector) = &design.detector else { return None };
     let sampling = design.receiver.method.sampling().filter(|it| it.blank_ticks > 0)?;
@@ -73,7 +74,7 @@ pub fn stray_room(design: &Design) -> Option<f64> {
 pub struct OwnLight {
     /// When the marks leave of the shots whose echoes are looked at, in ticks since the line began.
     shots: Vec<Vec<i64>>,
-    /// When the channel is blind, in ticks since then: one time after another, none of which overlap.
+    /// Blind times of the channel, in ticks since the line began: in order, without overlap.
     blind: Vec<Range<i64>>,
     /// First tick behind a mark in which it is told again.
     over: i64,
@@ -81,7 +82,7 @@ pub struct OwnLight {
 }
 
 impl OwnLight {
-    /// Of `design`, to echoes that come up to `tof` seconds later.
+    /// The own light of `design` in the way of echoes that come up to `tof` seconds later.
     pub(super) fn of(design: &Design, blind: Option<Blind>, tof: f64) -> Self {
         Self::new(design, blind, tof, |shot| own_marks(design, shot).collect())
     }
@@ -133,8 +134,8 @@ impl OwnLight {
         self.told((tof_from_range(range) * self.ticks_per_s).round() as i64)
     }
 
-    /// The same of every tick at which an echo from `nearest` to `farthest` metres may come, with its range, m, the
-    /// farthest first. Where a channel is still blind with the mark itself nothing is asked.
+    /// The same for every tick at which an echo from `nearest` to `farthest` metres may come, with its range,
+    /// m, the farthest first. Ticks in which a channel is still blind from the mark itself are left out.
     pub fn each_told(
         &self,
         nearest: f64,
@@ -144,8 +145,8 @@ impl OwnLight {
         lags.rev().map(move |late| (self.range(late), self.told(late)))
     }
 
-    /// The same without ticks at which as much is told as at the next one: what is told changes where a blind
-    /// time begins or ends for a mark.
+    /// The same without ticks that equal the next one: the numbers change only at a mark's entry into or exit
+    /// from a blind time.
     pub(super) fn each_change(
         &self,
         nearest: f64,
@@ -178,12 +179,12 @@ impl OwnLight {
         (ticks(nearest).ceil() as i64).max(self.over)..=ticks(farthest) as i64
     }
 
-    /// The range, m, of an echo that comes so many ticks later.
+    /// The range, m, of an echo that comes `late` ticks later.
     fn range(&self, late: i64) -> f64 {
         range_from_tof(late as f64 / self.ticks_per_s)
     }
 
-    /// How many marks of each shot are told of an echo that comes so many ticks later.
+    /// The number of marks of each shot that are told, for an echo that comes `late` ticks later.
     fn told(&self, late: i64) -> Vec<usize> {
         let is_told = |mark: &&i64| {
             let place = **mark + late;
@@ -228,7 +229,8 @@ mod tests {
 
     use super::*;
 
-    /// At the worst tick from `nearest` metres to 150, and at all together, shots of which less than two marks are told.
+    /// Shots with less than two marks told: at the worst tick from `nearest` metres to 150, and at all of
+    /// them together.
     fn lost(design: &Design, nearest: f64) -> [usize; 2] {
         let sampling = design.receiver.method.sampling().unwrap();
         let blind = Blind::at_most(sampling).map(Blind::between_ticks);
@@ -239,8 +241,9 @@ mod tests {
         })
     }
 
-    /// Of 400 ps to a tick, as walls in steps of half a tick show: 6 ticks before a mark to 16 behind it, echoes between
-    /// two ticks included. Fewer behind a shorter mark, and none where there is no stray light.
+    /// Simulated walls in steps of half a tick of 400 ps show 6 ticks before a mark to 16 behind it, echoes
+    /// between two ticks included. A shorter mark has fewer behind it, and a sensor without stray light has
+    /// none.
     #[test]
     fn a_channel_is_blind_from_where_its_own_light_shows() {
         let of = |changes: &[(&str, &str)]| {
@@ -257,8 +260,8 @@ mod tests {
         assert_eq!(of(&[("receiver.blank_ns", "0")]), None);
     }
 
-    /// As walls show that are simulated: behind an amplifier of 129 MHz an isolation of 51 dB leaves so much of 1420 nJ
-    /// that the end of it was found at 1.05 m in each of 1024 shots with 6 ns of blanking, and in none with 20 ns.
+    /// Simulated walls show: behind an amplifier of 129 MHz an isolation of 51 dB leaves so much of 1420 nJ
+    /// that its end was found at 1.05 m in each of 1024 shots with 6 ns of blanking, and in none with 20 ns.
     #[test]
     fn stray_light_must_be_over_when_the_channel_listens_again() {
         let room = |changes: &[(&str, &str)]| {
@@ -292,7 +295,7 @@ mod tests {
         let own = OwnLight::of_words(&narrow, &words, blind, tof_from_range(150.0));
         let same = OwnLight::of(&narrow, Some(blind), tof_from_range(150.0));
         assert!(own.each_told(1.0, 150.0).eq(same.each_told(1.0, 150.0)));
-        // Where it changes, all that is told comes, each at the farthest range of a stretch.
+        // Each change appears with all that is told, at the farthest range of its stretch.
         let mut all: Vec<_> = own.each_told(1.0, 150.0).collect();
         all.dedup_by(|next, before| next.1 == before.1);
         let mut changes: Vec<_> = own.each_change(1.0, 150.0).collect();

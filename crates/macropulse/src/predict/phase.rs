@@ -1,4 +1,4 @@
-//! What a receiver of taps finds of a target that modulated light meets.
+//! Probability that a receiver of taps finds a target, in closed form.
 //!
 //! The phasor of a modulation frequency is a mean phasor with normal noise in both parts. Its power over that of noise
 //! decides whether there is a return; it also is half the inverse of the variance of the phase. A frequency with a full
@@ -19,12 +19,12 @@ use crate::units::{range_from_tof, s_from_fs, tof_from_range};
 pub(super) struct Phases {
     lock_in: LockIn,
     false_alarm: f64,
-    /// Power that is asked of so many phasors together.
+    /// Power that is asked of the sum of phasors, by their number.
     thresholds: Vec<f64>,
     gate_fs: (i64, i64),
 }
 
-/// What is to be expected.
+/// Expected findings.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Chances {
     /// Probability of a return in the right interval.
@@ -56,7 +56,7 @@ struct Accepted {
 }
 
 impl Phases {
-    /// Of a sensor of modulated light; `None` of others.
+    /// The forecast of a sensor of modulated light; `None` for others.
     pub fn of(design: &Design, method: &PhaseMethod) -> Option<Self> {
         let Detector::LockIn(lock_in) = &design.detector else { return None };
         let thresholds = (0..=lock_in.contrast.len())
@@ -75,8 +75,8 @@ impl Phases {
         self.false_alarm
     }
 
-    /// What is found at `range` metres of so many detected photons of a shot, under `falling` electrons a second that
-    /// come evenly.
+    /// The findings at `range` metres for this number of detected photons of a shot, under `falling`
+    /// electrons a second that come evenly.
     pub fn chances(&self, range: f64, photons: f64, falling: f64) -> Chances {
         let tof = tof_from_range(range);
         let seen: Vec<Seen> = self.each(tof, photons, falling).collect();
@@ -108,7 +108,7 @@ impl Phases {
         Chances { pd: pd.min(1.0), snr: (2.0 * power).sqrt(), precision, bound }
     }
 
-    /// What each frequency makes of this light.
+    /// The phasor of each frequency for this light.
     fn each(&self, tof: f64, photons: f64, falling: f64) -> impl Iterator<Item = Seen> + '_ {
         let LockIn { modulation, contrast, full_well, .. } = &self.lock_in;
         let of_tap = photons / f64::from(modulation.taps());
@@ -128,7 +128,7 @@ impl Phases {
         })
     }
 
-    /// What is accepted of phasors with this mean `power`, in units of that of noise.
+    /// The accepted share of phasors with this mean `power`, in units of that of noise.
     ///
     /// The power M of F phasors is a gamma variable of F + k, k a Poisson variable of the mean P. With T(F) for the
     /// probability that it is above the threshold the mean of what is above is (F·T(F + 1) + P·T(F + 2))/T(F).
@@ -151,8 +151,8 @@ impl Phases {
         right.product()
     }
 
-    /// Information about the time of flight in so many photons without noise of a detector, 1/s²: of a tone with N of
-    /// them and the contrast c it is (2πf)²·N·(1 − √(1 − c²)).
+    /// Information about the time of flight in this number of photons without noise of a detector, 1/s². A
+    /// tone with N of them and the contrast c has (2πf)²·N·(1 − √(1 − c²)).
     fn information(&self, photons: f64) -> f64 {
         let LockIn { modulation, contrast, .. } = &self.lock_in;
         let of_tone = photons / modulation.hz.len() as f64;

@@ -1,5 +1,5 @@
-//! What a receiver of samples finds of a target that all shots of a channel meet alike, as far as its light does
-//! not meet that of others.
+//! Probability that a receiver of samples finds a target that all shots of a channel meet alike, as far as
+//! its light does not meet that of others.
 //!
 //! A mark of n photons is a height n·g(δ) behind the matched filter, δ the part of a tick by which it is
 //! beside a sample, with the noise of the filtered samples and of its own photons. The marks of a word are
@@ -14,7 +14,7 @@ use crate::design::Design;
 use crate::design::detector::Sampled;
 use crate::units::RMS_OF_FWHM;
 
-/// Points of the sum: with four times as many the probability differs by less than 0.001.
+/// Points of the sum: with 8192 of them the probability differs by less than 0.001.
 const POINTS: u32 = 2048;
 
 /// Marks of a word at most: for more the sum takes too much memory.
@@ -23,7 +23,7 @@ pub(super) const MOST_MARKS: usize = 64;
 /// The lag of a target and those beside it: noise may lift one of them over the threshold.
 const LAGS: usize = 3;
 
-/// What is to be expected.
+/// Expected findings.
 pub(super) struct Chances {
     /// Probability of a return.
     pub pd: f64,
@@ -83,11 +83,11 @@ impl Filtered {
         }
     }
 
-    /// What the receiver takes for the level and the standard deviation of its noise, photons, where a share of
-    /// so many marks to a tick has `photons` each.
+    /// The receiver's estimates of the level and the standard deviation of its noise, in photons, if
+    /// `per_tick` marks to a tick have `photons` each.
     ///
-    /// It takes the median of the signal, and how far the 15.87 % quantile is below it, which are 0 and −1 standard
-    /// deviations of noise alone. Light that does not stand out raises a quantile z by
+    /// It takes the median of the signal, and the distance from there to the 15.87 % quantile, which are 0
+    /// and −1 standard deviations of noise alone. Light that does not stand out raises a quantile z by
     ///
     /// Δ(z) = marks to a tick · ∫ (Φ(z) − Φ(z − s(t))) dt / φ(z),
     ///
@@ -109,7 +109,7 @@ impl Filtered {
         Estimated { level: sigma * level, deviation: sigma * (1.0 + level - low) }
     }
 
-    /// Standard deviation of the time of a mark of so many `photons`, ticks.
+    /// Standard deviation of the time of a mark of this number of `photons`, ticks.
     fn timing(&self, photons: f64, excess: f64) -> f64 {
         let square = self.rms * self.rms;
         let steepness = photons / square * libm::exp(-0.5 / square);
@@ -132,8 +132,8 @@ pub(super) fn blind(sampled: &Sampled, sampling: &Sampling, background: f64) -> 
     Blind::of(sampling, sampled.stray_shows(background) / sampled.sample)
 }
 
-/// What the receiver of `design` finds of marks of so many `photons`, under `background` detections per second, of
-/// some shots of which so many marks each are `told`.
+/// The findings of the receiver of `design` for marks of this number of `photons`, under `background`
+/// detections per second, if `told` lists the numbers of marks that are told of some shots.
 pub(super) fn chances(
     (design, sampled, settings): (&Design, &Sampled, &decode::Sampled),
     points: &[Points],
@@ -175,13 +175,13 @@ pub(super) fn chances(
     }
 }
 
-/// Marks by which the receiver decides at least, of words of so many.
+/// The least number of marks by which the receiver decides, for words of `weight` marks.
 fn fewest(sampling: &Sampling, weight: usize) -> usize {
     usize::from(sampling.least_marks).min(weight)
 }
 
-/// The points of the sum for so many marks: how late the light is, ticks, and of each mark the normal
-/// deviates of its noise at each lag.
+/// The points of the sum for one number of marks: the delay of the light, ticks, and the normal deviates of
+/// the noise of each mark at each lag.
 #[derive(Debug, Clone)]
 pub(super) struct Points {
     late: Vec<f64>,
@@ -207,7 +207,7 @@ impl Points {
     }
 }
 
-/// What is found of all words.
+/// Findings over all words.
 #[derive(Debug, Clone, Copy, Default)]
 struct Seen {
     share: f64,
@@ -231,7 +231,7 @@ impl Rule {
     fn seen(&self, filtered: &Filtered, points: &Points, (photons, excess): (f64, f64)) -> Seen {
         let deviation =
             |photons: f64| (filtered.noise + excess * filtered.of_photon * photons.max(0.0)).sqrt();
-        // What the sum of so many marks must be.
+        // The sum that this number of marks must reach.
         let Estimated { level, deviation: estimated } = self.estimated;
         let needed = |threshold: f64, count: usize| threshold * estimated * (count as f64).sqrt();
         let all = needed(self.threshold, self.count);
@@ -297,11 +297,11 @@ impl Axes {
     }
 }
 
-/// How far below zero the sensor's own marks pull the baseline of an amplifier that is coupled by a
-/// capacitor, at most, in detected photons; 0 where light does not move it.
+/// The deepest point below zero to which the sensor's own marks pull the baseline of an amplifier coupled by
+/// a capacitor, in detected photons; 0 if light does not move it.
 ///
 /// Behind each mark it lies ω·Q lower, Q its [charge](Sampled::charge) after it was clipped, and comes back
-/// with exp(−ω·t). The words follow each other along a line until so many have been sent as it remembers.
+/// with exp(−ω·t). The words follow each other along a line for as long as the baseline remembers.
 pub fn deepest_baseline(design: &Design, sampled: &Sampled) -> f64 {
     if sampled.low_cutoff == 0.0 {
         return 0.0;

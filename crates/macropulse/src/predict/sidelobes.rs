@@ -1,13 +1,13 @@
-//! How often a return is taken for a sidelobe of its own macropulse, in closed form.
+//! Probability that a return is taken for a sidelobe of its own macropulse, in closed form.
 //!
-//! Shifted by so many chips, A of the N marks of a macropulse fall upon others of it. What is found of
-//! those counts at the sidelobe as at the peak. At the peak the other d = N − A marks count, too, X of
-//! which are found, X ~ Bin(d, p); at the sidelobe what chance lights in as many places, Y ~ Bin(d, q).
-//! The sidelobe is taken where Y > X; where both are the same, neighbours decide.
+//! Shifted by some chips, A of the N marks of a macropulse fall upon others of it. The part of those that is
+//! found counts at the sidelobe as at the peak. At the peak the other d = N − A marks count, too, X of which
+//! are found, X ~ Bin(d, p). At the sidelobe Y of as many places are lit by chance, Y ~ Bin(d, q). The
+//! sidelobe is taken if Y > X; if both are the same, neighbours decide.
 //!
-//! The returns that come first have no neighbours. Of two lags with as many marks they take the nearer one: the sidelobe
-//! on one side of the peak. They may mislead those about them, and how many is not known. So there is no forecast where
-//! more than a few of them lie on one.
+//! The returns that come first have no neighbours. If two lags have the same number of marks they take the
+//! nearer one: the sidelobe on one side of the peak. They may mislead those about them, and to what extent is
+//! not known. So there is no forecast if more than a few of them lie on one.
 
 use macropulse_codec::statistics::binomial;
 
@@ -15,7 +15,7 @@ use super::matched::Lone;
 use crate::design::Design;
 use crate::units::{range_from_tof, s_from_fs};
 
-/// Macropulses that stand for all: every so many-th of them.
+/// Number of macropulses that stand for all, evenly spread.
 const SAMPLE: usize = 64;
 
 /// Share of the returns up to which those that come first may lie on a sidelobe.
@@ -68,8 +68,8 @@ impl Sidelobes {
         Self { own: own.map(|(alone, (count, squares))| (alone, count, squares)).collect() }
     }
 
-    /// What is to be expected where a share `found` of the marks of returns is found, and chance lights a
-    /// share `density` of places. `None` where it depends on the `lone` ones.
+    /// The expected sidelobes if a share `found` of the marks of returns is found, and chance lights a share
+    /// `density` of places. `None` if it depends on the `lone` ones.
     pub fn aside(&self, found: f64, density: f64, lone: Lone) -> Option<Aside> {
         let (mut share, mut squares, mut misled) = (0.0, 0.0, 0.0);
         for &(alone, count, square) in &self.own {
@@ -121,7 +121,8 @@ mod tests {
         assert_eq!(correlation(&[0, 3, 6]), [3, 0, 0, 2, 0, 0, 1]);
     }
 
-    /// Two coins against two, as counted by hand: 1 against 0 in 2/16, 2 against 0 or 1 in 3/16, as many in 6/16.
+    /// Two coins against two, as counted by hand: 1 against 0 in 2/16, 2 against 0 or 1 in 3/16, a tie in
+    /// 6/16.
     #[test]
     fn coins_exceed_coins_as_counted() {
         assert!((exceeds(2, 0.5, 0.5) - 5.0 / 16.0).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Whether a design will do what is wanted of it, and what fails first.
+//! The verdict on a design: if it meets its requirements, and what fails first.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -12,7 +12,7 @@ use crate::units::{range_from_tof, s_from_fs};
 /// Share of converters' work that may be lost.
 const LOSS: f64 = 0.01;
 
-/// What is wanted of a sensor.
+/// Requirements on a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
     /// Reflectance of the target.
@@ -28,26 +28,26 @@ pub struct Wanted {
 /// One thing that must hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Check {
-    /// What it is about.
+    /// The subject of the check.
     pub name: &'static str,
     /// By what factor it is missed; it holds up to 1. Infinite where no factor would do.
     pub shortfall: f64,
-    /// What was found.
+    /// The finding.
     pub finding: String,
-    /// What would be needed.
+    /// The change that would be needed.
     pub remedy: String,
 }
 
 impl Check {
-    /// Whether it holds.
+    /// Tells if the check holds.
     pub fn holds(&self) -> bool {
         self.shortfall <= 1.0
     }
 }
 
-/// What must hold, in the order of the light: eyes, the light alone, own light, sunlight, converters, false
-/// returns, chips on a slanted surface. `by_night` is the same without the sun. What is idealised
-/// is left out.
+/// The checks in the order of the light: eyes, the light alone, own light, sunlight, converters, false
+/// returns, chips on a slanted surface. `by_night` is the same without the sun. Idealised properties are left
+/// out.
 pub fn checks(by_day: &Forecaster, by_night: &Forecaster, wanted: &Wanted) -> Vec<Check> {
     let day = by_day.design();
     let forecast = by_day.forecast(wanted.reflectance, wanted.range);
@@ -140,7 +140,7 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
     }
 }
 
-/// Forecasts of samples are so exact: with four times as many points of their sum they differ by less.
+/// Exactness of forecasts of samples: with four times the points of their sum they differ by less.
 const EXACT: f64 = 1e-3;
 
 /// By what factor more is missed where returns have probability `pd` than where they have the one `wanted`: 1 at
@@ -150,8 +150,8 @@ pub fn missed(pd: f64, wanted: f64) -> f64 {
     if pd < wanted - EXACT { factor } else { factor.min(1.0) }
 }
 
-/// Whether enough is found at the range up to the one wanted at which own light hides most marks; `None` of a
-/// channel that it does not blind.
+/// Checks that enough is found at the range, up to the wanted one, at which own light hides most marks;
+/// `None` for a channel that it does not blind.
 fn own_light(night: &Forecaster, wanted: &Wanted) -> Option<Check> {
     Blind::at_most(night.design().receiver.method.sampling()?)?;
     let worst = night.worst(wanted.reflectance, wanted.range);
@@ -229,8 +229,8 @@ fn converters(design: &Design, forecast: &Forecast) -> Check {
     }
 }
 
-/// Whether chips, or marks behind the detector, are told apart on a surface at `range` metres that is slanted by
-/// 45°; `None` of a beam that is a line, and of light without pulses.
+/// Checks that chips, or marks behind the detector, are told apart on a surface at `range` metres that is
+/// slanted by 45°; `None` for a beam that is a line, and for light without pulses.
 pub fn slant(design: &Design, range: f64) -> Option<Check> {
     if design.light.divergence == 0.0 || !design.emission.is_pulsed() {
         return None;

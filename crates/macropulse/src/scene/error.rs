@@ -1,4 +1,4 @@
-//! What can be wrong with a scene, told to the person who wrote it.
+//! Errors in a scene, told to the person who wrote it.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ pub enum Error {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The message of the system.
         source: std::io::Error,
     },
     /// A mesh file was read but holds no usable mesh.
@@ -20,9 +20,9 @@ pub enum Error {
     Mesh {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         problem: String,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// A mesh names a file that lies outside the folder of the scene.
@@ -30,7 +30,7 @@ pub enum Error {
     Outside {
         /// The mesh.
         path: PathBuf,
-        /// What it names.
+        /// The file, as the mesh names it.
         named: String,
     },
     /// A scene file says something that cannot be.
@@ -42,17 +42,17 @@ pub enum Error {
         line: usize,
         /// Column, from 1.
         column: usize,
-        /// What is wrong and what to do.
+        /// The problem and the remedy.
         message: String,
     },
     /// A scene that a program describes says something that cannot be.
     #[error("{origin}: {key}{}{message}", if key.is_empty() { "" } else { ": " })]
     Keyed {
-        /// What the program calls its description.
+        /// The program's name for its description.
         origin: String,
         /// The key, as `object[1].position_m`; empty for the scene as a whole.
         key: String,
-        /// What is wrong and what to do.
+        /// The problem and the remedy.
         message: String,
     },
     /// A value was changed to what cannot be.
@@ -60,13 +60,13 @@ pub enum Error {
     Changed {
         /// The dotted key, or several.
         key: String,
-        /// What is wrong and what to do.
+        /// The problem and the remedy.
         message: String,
     },
     /// Neither a built-in scene nor a file.
     #[error("there is no scene {asked:?}: it is neither a file nor built in; {}built in are {known}", nearest.as_ref().map(|name| format!("did you mean {name:?}? ")).unwrap_or_default())]
     UnknownScene {
-        /// What was asked for.
+        /// The name that was asked for.
         asked: String,
         /// The built-in scene of the most similar name.
         nearest: Option<String>,

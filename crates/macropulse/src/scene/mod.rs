@@ -1,4 +1,4 @@
-//! What the beam meets: meshes, materials, transforms, ray casting.
+//! The surroundings of the sensor: meshes, materials, transforms, ray casting.
 
 mod approach;
 mod assemble;
@@ -73,8 +73,8 @@ use world::{PacketHits, World};
 /// So many rays at most are put in order together.
 const ORDERED: usize = 1 << 20;
 
-/// Directions of lasers that take turns are fetched into the cache so many places ahead: sixteen turns of 64 lasers.
-/// A turning head is cast 4 % faster by that.
+/// Number of places by which directions of lasers that take turns are fetched into the cache ahead: sixteen
+/// turns of 64 lasers. It casts a turning head 4 % faster.
 const AHEAD: usize = 1024;
 
 /// Everything the light can meet, and where the sensor stands.
@@ -85,11 +85,11 @@ pub struct Scene {
     pub name: String,
     /// The TOML text that describes it, with the changes made to it.
     pub text: String,
-    /// What surfaces are made of; [`Hit::material`] counts in this list.
+    /// Materials of surfaces; [`Hit::material`] counts in this list.
     pub materials: Vec<Material>,
-    /// What surfaces belong to; [`Hit::object`] counts in this list.
+    /// Objects that surfaces belong to; [`Hit::object`] counts in this list.
     pub objects: Vec<Object>,
-    /// Where the sensor stands and looks, at any time.
+    /// Place and attitude of the sensor, at any time.
     pub sensor: Motion,
     /// All that moves, the sensor included; empty for a scene that stands still.
     pub moving: Vec<Moving>,
@@ -99,10 +99,10 @@ pub struct Scene {
     pub interferers: Vec<Interferer>,
     /// Every assumption made while reading: units, axes, materials. To be shown to the user.
     pub notes: Vec<String>,
-    /// What is left out of what its files hold: lines, skins, animations. To be shown to the user.
+    /// Contents of its files that are left out: lines, skins, animations. To be shown to the user.
     pub warnings: Vec<String>,
     world: World,
-    /// Of the triangles and shapes, in the order of the file.
+    /// Digest of the triangles and shapes, in the order of the file.
     surfaces: Digest,
 }
 
@@ -111,7 +111,7 @@ pub struct Scene {
 pub struct Object {
     /// Name, as the scene file has it.
     pub name: String,
-    /// Whether points on it are counted on their own.
+    /// Set if points on it are counted on their own.
     pub is_target: bool,
 }
 
@@ -132,7 +132,7 @@ impl Scene {
             return Self::from_toml(text, name, Path::new(""));
         }
         let name = path.display().to_string();
-        // What looks like a path is meant as one.
+        // A name that looks like a path is meant as one.
         if path.is_file() || path.extension().is_some() || path.components().count() > 1 {
             let (text, base) = text_of(path)?;
             return Self::from_toml_in(&text, &name, base, room);

@@ -1,4 +1,4 @@
-//! What is left of the signal when the light that was found is taken away from it.
+//! The residual: the signal without the light of the returns that were found.
 
 use super::filter::Filtered;
 use super::pulse::Pulse;
@@ -9,23 +9,23 @@ use super::{Band, Mark, Rule, Sampling, Sum};
 /// Share of a pulse that is uncertain beside the number of its photons: its shape, and when it came.
 const SHAPE: f32 = 0.04;
 
-/// What is uncertain by less than this share of the noise is as good as certain.
+/// A value with less doubt than this share of the noise is as good as certain.
 const CERTAIN: f32 = 0.25;
 
-/// A mark that is uncertain counts if it is so many standard deviations above what may be left of others.
+/// Standard deviations by which an uncertain mark must stand out from the remains of others to count.
 const TOLD: f32 = 4.0;
 
-/// Marks are equal if they differ by no more than so many standard deviations of their difference …
+/// Marks are equal if they differ by no more than this number of standard deviations of their difference …
 const EQUAL: f32 = 3.0;
 
 /// … and this share of their mean.
 const SPREAD: f32 = 0.08;
 
-/// By what factor marks may differ on which no other light was found: the spot moves on during a word, and where it
-/// lies across an edge one mark has more of it on the surface than another. Of `coded-32`, whose spot moves by 0.3
-/// pixels, eleven of 302 pixels of `car-70m`, all at its outline, had a mark hidden and the others apart by factors
-/// of 1.3 to 1.9; with this none is lost, and of `coded-16` on tiles without neighbours no more points are false, 33
-/// of 196 012 as before.
+/// Factor by which marks without other light may differ. The spot moves on during a word; across an edge, one
+/// mark has more of it on the surface than another. For `coded-32`, whose spot moves by 0.3 pixels, eleven of
+/// 302 pixels of `car-70m`, all at its outline, had a mark hidden and the others apart by factors of 1.3 to
+/// 1.9. With this factor none is lost, and `coded-16` has no more false points on tiles without neighbours:
+/// 33 of 196 012 as before.
 const SPLIT: f32 = 2.0;
 
 /// Light that was found.
@@ -55,7 +55,7 @@ impl Found {
 /// Why a candidate is taken for no light of its shot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// Of what is left too few marks tell anything.
+    /// Too few marks of the residual tell anything.
     TooFewMarks,
     /// A mark is missing, and the others are not equally strong.
     MarksDiffer,
@@ -87,7 +87,7 @@ pub(super) struct Residual<'a> {
     counted: Vec<Mark>,
     /// The score of the last candidate, and what it had to reach, as far as it came to that.
     asked: (Option<f32>, Option<f32>),
-    /// Whether all candidates were tested once.
+    /// Set when all candidates were tested once.
     is_again: bool,
 }
 
@@ -113,12 +113,12 @@ impl<'a> Residual<'a> {
         self.is_again = true;
     }
 
-    /// What is left of the signal.
+    /// The residual signal.
     pub(super) fn signal(&self) -> &[f32] {
         &self.filtered.signal
     }
 
-    /// What is left at a place, and how uncertain it is; not numbers beyond the record.
+    /// The residual at a place, and its doubt; not numbers beyond the record.
     pub(super) fn at(&self, place: i64) -> (f32, f32) {
         let Filtered { signal, doubt, .. } = &self.filtered;
         let at =
@@ -126,7 +126,7 @@ impl<'a> Residual<'a> {
         at.unwrap_or((f32::NAN, f32::NAN))
     }
 
-    /// Whether a mark at this place counted for the last candidate.
+    /// Tells if a mark at this place counted for the last candidate.
     pub(super) fn counts(&self, place: i64) -> bool {
         self.counted.iter().any(|mark| mark.place as i64 == place)
     }
@@ -136,7 +136,7 @@ impl<'a> Residual<'a> {
         self.asked
     }
 
-    /// Whether the `candidate` is still there; if so, its light is taken away.
+    /// Tells if the `candidate` is still there; if so, takes its light away.
     pub(super) fn test(
         &mut self,
         candidate: &Candidate,
@@ -184,8 +184,8 @@ impl<'a> Residual<'a> {
         Ok(found)
     }
 
-    /// The lag, of the one that was found and those beside it, at which the marks are highest together:
-    /// what was taken away since may have moved it.
+    /// The lag with the highest sum of marks, among the one that was found and those beside it: light that
+    /// was taken away since may have moved it.
     pub(super) fn summit(&mut self, marks: &[i64], lag: i64) -> i64 {
         self.sort(marks, lag);
         let signal = &self.filtered.signal;
@@ -240,12 +240,12 @@ impl<'a> Residual<'a> {
         is_enough.then(|| rule.sum(&self.counted, marks.len())).flatten()
     }
 
-    /// What the score must reach; `None` where marks are missing and the others not equal.
+    /// The score to reach; `None` if marks are missing and the others not equal.
     fn threshold(&self, (sum, marks): (&Sum, usize), rule: &Rule) -> Option<f32> {
         if self.counted.len() == marks {
             return Some(rule.threshold);
         }
-        // Of marks that are all clipped, or nearly so, it is not known how strong they are.
+        // The strength of marks that are all clipped, or nearly so, is not known.
         let lowest = sum.most - sum.spread;
         let is_told = lowest * self.pulse.highest() < 0.5 * f32::from(self.sampling.full_scale);
         let doubt = self.counted.iter().map(|mark| mark.doubt).fold(0.0, f32::max);
@@ -255,7 +255,7 @@ impl<'a> Residual<'a> {
         (!is_told || sum.spread <= differ || is_split).then_some(rule.threshold + super::MISSING)
     }
 
-    /// Takes pulses of so many `photons` away, that came `late` behind the `places`.
+    /// Takes away pulses of `photons` each that came `late` behind the `places`.
     fn take_away(
         &mut self,
         places: impl Iterator<Item = i64>,
@@ -284,8 +284,8 @@ impl<'a> Residual<'a> {
         }
     }
 
-    /// Leaves out what stands about clipped pulses of so many `photons`, and all of the run of clipped samples
-    /// that each is in, for which the amplifier holds: how they look is not known.
+    /// Leaves out the surroundings of clipped pulses of `photons` each, and the whole run of clipped samples
+    /// around each for which the amplifier holds: their shape is not known.
     fn close(&mut self, places: impl Iterator<Item = i64>, late: f64, photons: f32) {
         let span = self.pulse.span() as i64;
         let sigma = self.filtered.sigma;

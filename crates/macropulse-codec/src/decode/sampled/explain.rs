@@ -46,12 +46,12 @@ pub struct SampledExplanation {
     /// The signal behind the matched filter about the marks at the first lag of `tested`: the tick that it
     /// begins with, the signal at first, and what of it was left when that lag was tested.
     pub signal: (i64, Vec<f32>, Vec<f32>),
-    /// Lags that were tested, in the order in which they were: first those whose light is there for certain.
-    /// Of none, the lag with the highest score, as it would have been tested at the end.
+    /// Lags in the order of their tests: first those whose light is there for certain. If there is none, the
+    /// lag with the highest score, as it would have been tested at the end.
     pub tested: Vec<Tested>,
-    /// Whether any of them was a candidate.
+    /// Set if any of them was a candidate.
     pub is_candidate: bool,
-    /// What the receiver decided.
+    /// Decision of the receiver.
     pub verdict: Verdict,
     /// Echoes of other shots that were cancelled before the first candidate was tested and that have a mark
     /// where this one has one there.
@@ -63,13 +63,13 @@ pub struct SampledExplanation {
 pub struct Tested {
     /// The lag.
     pub lag: i64,
-    /// What its marks looked like then, one by one.
+    /// Its marks at that time, one by one.
     pub marks: Vec<MarkSeen>,
     /// Standard deviations that their sum was above 0; `None` where too few counted.
     pub score: Option<f32>,
-    /// What it had to reach: more where marks were missing. `None` where it did not come to that.
+    /// The score that it had to reach: more if marks were missing. `None` if the test ended earlier.
     pub threshold: Option<f32>,
-    /// What came of it.
+    /// Result of the test.
     pub outcome: Result<Light, Refusal>,
 }
 
@@ -80,11 +80,11 @@ pub struct Light {
     pub late: f64,
     /// Detected photons per mark.
     pub photons: f32,
-    /// Whether its time is that of edges of clipped pulses.
+    /// Set if its time is that of edges of clipped pulses.
     pub is_clipped: bool,
 }
 
-/// What a mark looked like.
+/// A mark as the receiver saw it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarkSeen {
     /// When it would come.
@@ -93,11 +93,11 @@ pub struct MarkSeen {
     pub photons: f32,
     /// Standard deviation of what was cancelled there; infinite where nothing can be told.
     pub doubt: f32,
-    /// Whether it counted.
+    /// Its part in the sum.
     pub state: MarkState,
 }
 
-/// Whether a mark counted, and why not.
+/// The part of a mark in the sum, and why it has none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MarkState {
     /// It counted.
@@ -163,8 +163,8 @@ impl Receiver {
         let channels = owned.each_channel();
         let of_channel = channels.iter().find(|(shots, _)| shots.contains(&shot));
         let Some((shots, log)) = of_channel else { return Err(Error::NoSuchShot { shot }) };
-        // Where there are no samples nothing but the shot matters, and its own tick is the epoch: that of the
-        // samples, and the times of other shots, may be too far away to be counted.
+        // Without samples only the shot matters, and its own tick is the epoch: that of the samples, and the
+        // times of other shots, may be too far away to be counted.
         let alone;
         let (log, epoch, decoded) = if samples.is_empty() {
             alone = log.part(log.owned.clone());

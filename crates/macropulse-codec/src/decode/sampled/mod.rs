@@ -1,23 +1,23 @@
-//! The receiver of samples: it adds up what stands at the marks of a word.
+//! The receiver of samples: it adds up the heights at the marks of a word.
 //!
-//! 0. Where the amplifier is coupled by a capacitor, the baseline that light has left behind is added to the
+//! 0. For an amplifier coupled by a capacitor, the baseline that light has left behind is added to the
 //!    samples again ([`coupling`]).
-//! 1. The samples of a channel are filtered by a filter matched to the pulse of a mark, so that each mark
-//!    is a number of detected photons at one tick ([`filter`]). How strong the noise is, is estimated from
-//!    them. Ticks at which the sensor's own marks are fired, or that follow clipped samples, tell nothing.
-//! 2. Of each shot, at each lag: the mean of the marks that tell something, none of which counts much
-//!    more than the least one, so that a bright mark of another shot cannot carry a word alone. Where that
-//!    mean exceeds the threshold and both lags beside it, light may have come ([`search`]).
-//! 3. The strongest candidate is tested again, and if it holds, its pulses are taken away from the
-//!    signal; then the next one. What was taken away is uncertain, and marks there count only if they
-//!    stand out from that, too ([`cancel`]). Where a mark is missing, the others must be equally strong; those
-//!    that are not are looked at again at the end, as an edge in a moving spot makes them differ.
-//! 4. The range of a return is that of its marks together, that of clipped pulses that of their edges
+//! 1. A filter matched to the pulse of a mark makes each mark a number of detected photons at one tick
+//!    ([`filter`]). The filtered samples also give the strength of the noise. Ticks at which the sensor's own
+//!    marks are fired, or that follow clipped samples, tell nothing.
+//! 2. For each shot and lag, the marks that tell something are averaged. None counts much more than the
+//!    least one, so a bright mark of another shot cannot carry a word alone. A mean above the threshold and
+//!    above both lags beside it is a candidate ([`search`]).
+//! 3. The strongest candidate is tested again. If it holds, its pulses are taken away from the signal; then
+//!    the next one follows. Light that was taken away leaves a doubt, and marks there count only if they stand
+//!    out from it, too ([`cancel`]). If a mark is missing, the others must be equally strong. Those that are
+//!    not are looked at again at the end, as an edge in a moving spot makes them differ.
+//! 4. The range of a return comes from all its marks together, or from the edges of clipped pulses
 //!    ([`time`]).
 //!
-//! What it saw of one shot is told by the same steps ([`explain`]).
+//! An explanation of one shot comes from the same steps ([`explain`]).
 //!
-//! One channel is decoded after the other, in twelve bytes of memory for each of its samples.
+//! Channels are decoded one after the other, in twelve bytes of memory for each sample.
 
 mod cancel;
 mod coupling;
@@ -58,11 +58,11 @@ pub struct Sampled {
     pub sampling: Sampling,
 }
 
-/// What a receiver knows of the signal that is sampled.
+/// A receiver's knowledge of the signal that is sampled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sampling {
-    /// What a mark of one detected photon adds to the codes, in steps of 1/[`STEPS_OF_TICK`] tick; the
-    /// entry in the middle, of an odd number, is at the time of the mark.
+    /// Shape of a mark of one detected photon in the codes, in steps of 1/[`STEPS_OF_TICK`] tick; the entry
+    /// in the middle, of an odd number, is at the time of the mark.
     pub pulse: Vec<f32>,
     /// Excess noise factor F of the multiplication: n photons vary by F·n.
     pub excess: f64,
@@ -78,7 +78,7 @@ pub struct Sampling {
     /// Marks of a word that must tell something, neither blanked nor hidden by brighter light, to decide by
     /// them; of a word of fewer marks all.
     pub least_marks: u16,
-    /// Where the amplifier is coupled by a capacitor: the baseline is taken out of the samples first.
+    /// Set for an amplifier coupled by a capacitor: the baseline is taken out of the samples first.
     pub coupling: Option<Coupling>,
 }
 
@@ -86,7 +86,7 @@ impl Sampling {
     /// Entries of [`Sampling::pulse`] at most: 1024 ticks.
     pub const MOST_ENTRIES: usize = 1024 * STEPS_OF_TICK - 1;
 
-    /// How much more is asked of a word of which a mark is missing, in standard deviations of the sum.
+    /// Surplus that a word with a missing mark must reach, in standard deviations of the sum.
     pub const MORE_IF_MISSING: f64 = MISSING as f64;
 
     /// The matched filter of whole ticks: how much each sample counts, the middle one at the time of the
@@ -101,16 +101,16 @@ impl Sampling {
         Pulse::new(self).core() as u32
     }
 
-    /// From so many standard deviations above its level on, the signal is light, of which the noise is not
-    /// estimated.
+    /// Standard deviations above its level from which on the signal is light, and no longer counts for the
+    /// estimate of the noise.
     pub const STANDS_OUT: f64 = filter::LIGHT as f64;
 
     /// By how many of its own standard deviations the least of the marks that count lies below one that has light
     /// of others on it, and counts for nothing where enough are left.
     pub const FAR_ABOVE_LEAST: f64 = FAR as f64;
 
-    /// How many of its own standard deviations above the least of so many marks that are `counted`, out of `marks` of
-    /// a word, one counts at most.
+    /// The most that one mark counts, in its own standard deviations above the least of the `counted` marks,
+    /// for a word of `marks`.
     pub fn most_above_least(counted: usize, marks: usize) -> f64 {
         let above = f64::from(if counted < marks { ABOVE_IF_MISSING } else { ABOVE });
         match counted {
@@ -143,7 +143,7 @@ pub(super) fn decode(
             if within.is_empty() {
                 returns.reject(if from < to { Reject::OutsideGate } else { Reject::NoPeak });
             }
-            // Light of which a mark is hidden is no weaker for that.
+            // Light with a hidden mark is no weaker for that.
             let strength = |one: &Found| Strength { peak: 0, light: one.photons };
             receiver.pick.keep(receiver.returns.into(), &mut within, strength);
             let tick = samples.epoch + band.fired[shot];
@@ -164,7 +164,7 @@ pub(super) fn decode(
     returns
 }
 
-/// Whether the whole tick next to where light was found is in the gate.
+/// Tells if the whole tick nearest to the light is in the gate.
 fn is_in_gate(receiver: &Receiver, found: &Found) -> bool {
     let (nearest, farthest) = receiver.gate_ticks;
     (i64::from(nearest)..=i64::from(farthest)).contains(&(found.at().round() as i64))
@@ -291,19 +291,19 @@ struct Sum {
     score: f32,
 }
 
-/// A mark counts no more than the least one and so many standard deviations, beside what the least
-/// of so many marks is below their mean: 2.5 of three marks. Nearly one in five words of three marks
-/// has a mark that is cut by noise alone, by which 0.04 deviations of their mean are lost.
+/// Standard deviations above the least mark beyond which a mark counts no more. To these comes the distance
+/// of the least mark below the mean: 2.5 in all for three marks. Noise alone cuts a mark in nearly one of
+/// five words of three marks, which costs 0.04 deviations of their mean.
 const ABOVE: f32 = 1.65;
 
-/// The same of a word of which a mark is missing: 1.36 of two marks. Light of others in one mark then carries noise in
-/// the other as rarely as it carries noise in two marks of a word of three: of 3 marks, false points of 3·10⁻⁵ a shot,
-/// F 5.6 and σ 36, both once in some 3000 lags at which one has such light (2.8 and 3.2·10⁻⁴). With [`ABOVE`] it was
-/// eight times as often.
+/// The same for a word with a missing mark: 1.36 for two marks. Light of others in one mark then carries
+/// noise in the other as rarely as it carries noise in two marks of a word of three. For 3 marks, false
+/// points of 3·10⁻⁵ a shot, F 5.6 and σ 36, both happen once in some 3000 lags at which one has such light
+/// (2.8 and 3.2·10⁻⁴). With [`ABOVE`] it was eight times as often.
 const ABOVE_IF_MISSING: f32 = 0.8;
 
-/// A mark so many standard deviations of the least above it has light of others on it: of three marks of one
-/// light noise alone makes two differ by that once in 200 words.
+/// A mark that is this number of standard deviations above the least one has light of others. Noise alone
+/// makes two of three marks of one light differ by that once in 200 words.
 const FAR: f32 = 5.0;
 
 /// How often the least strength of a mark is bounded by halves, and by what share of the noise that bound is
@@ -311,7 +311,7 @@ const FAR: f32 = 5.0;
 const HALVINGS: usize = 16;
 const TOO_LOW: f32 = 1e-3;
 
-/// How much more is asked of a word of which a mark is missing, in standard deviations of the sum.
+/// Surplus that a word with a missing mark must reach, in standard deviations of the sum.
 const MISSING: f32 = 0.5;
 
 impl Rule {
@@ -340,23 +340,23 @@ impl Rule {
         }
     }
 
-    /// Marks that must count of a word of so many.
+    /// The least number of marks that must count, for a word of `marks`.
     fn fewest(&self, marks: usize) -> usize {
         usize::from(self.fewest).min(marks)
     }
 
-    /// How much one of so many marks that are `counted`, out of `marks`, counts at most where the `least` is so strong.
+    /// The most that one of the `counted` marks, out of `marks`, counts beside the `least`.
     fn cap(&self, least: f32, (counted, marks): (usize, usize)) -> f32 {
         let above = if counted < marks { ABOVE_IF_MISSING } else { ABOVE };
         least + (above - self.least_of[counted]) * self.deviation(least)
     }
 
-    /// The marks that count, out of so many `marks`, together; `None` of none.
+    /// The sum of the marks that count, for a word of `marks`; `None` if no mark counts.
     ///
-    /// Each is weighed by the inverse of its variance. How much one counts at most follows from the least
-    /// of those that are certain, if any is. One far above that has light of others, with which the least of
-    /// noise would do: where enough are left without it, their score is told, and less by what is asked more of
-    /// them.
+    /// Each is weighed by the inverse of its variance. The most that one counts follows from the least of
+    /// those that are certain, if any is. A mark far above that has light of others, with which a trace of
+    /// noise in the rest would do. If enough marks are left without it, the score is theirs, less the surplus
+    /// that is asked of fewer marks.
     fn sum(&self, counted: &[Mark], marks: usize) -> Option<Sum> {
         let heights = counted.iter().map(|mark| mark.height);
         let (lowest, most) = (heights.clone().reduce(f32::min)?, heights.reduce(f32::max)?);
@@ -384,9 +384,9 @@ impl Rule {
         Some(Sum { mean: sum / weights, least, spread: most - lowest, most, score })
     }
 
-    /// How strong the least of so many marks must be, in detected photons, for the others, none of which
-    /// counts more than the cap, to reach the threshold together with it: m + (n − 1)/n·(cap(m) − m) =
-    /// t·σ/√n. Of fewer marks that count it must be stronger. Found by halving, and a little too low.
+    /// The strength of the least of `marks`, in detected photons, at which the others, each up to the cap,
+    /// reach the threshold together with it: m + (n − 1)/n·(cap(m) − m) = t·σ/√n. With fewer marks it must be
+    /// stronger. Found by halving, and a little too low.
     fn least(&self, marks: usize) -> f32 {
         let count = marks as f32;
         let mean = self.threshold * self.sigma / count.sqrt();
@@ -402,7 +402,7 @@ impl Rule {
         low - TOO_LOW * self.sigma
     }
 
-    /// Standard deviation of a mark of so many photons.
+    /// Standard deviation of a mark of this number of `photons`.
     fn deviation(&self, photons: f32) -> f32 {
         (self.sigma * self.sigma + self.excess * photons.max(0.0)).sqrt()
     }

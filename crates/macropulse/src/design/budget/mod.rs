@@ -1,4 +1,4 @@
-//! Where the photons come from: energy, aperture and optics.
+//! The link budget, the origin of the photons: energy, aperture and optics.
 
 mod check;
 
@@ -11,16 +11,16 @@ use super::safety::{Class1, Condition, Limit, Sender, exposure, limits, strictes
 use super::{Emission, Light, Scan};
 use crate::units::{PLANCK, SPEED_OF_LIGHT};
 
-/// What an honest link is made of. SI units.
+/// The parts of an honest link. SI units.
 #[derive(Debug, Clone)]
 pub struct Budget {
     /// Wavelength, m.
     pub wavelength: f64,
     /// Energy of a shot, J, the mean over its labels: every mark has the same.
     pub energy: f64,
-    /// Where an eye is, and what counts there.
+    /// Place of the eye, and the rules that count there.
     eye: Eye,
-    /// What class 1 allows to a shot, worked out when first asked for.
+    /// Limits of class 1 for a shot, worked out when first asked for.
     limits: OnceLock<Vec<Limit>>,
     /// Diameter of the receiving aperture, m.
     pub aperture: f64,
@@ -28,27 +28,27 @@ pub struct Budget {
     pub transmission: f64,
     /// Width of the optical filter, m.
     pub filter: f64,
-    /// What the detector looks at.
+    /// Field of the detector.
     pub field: Field,
     /// Detections per photon.
     pub efficiency: f64,
 }
 
-/// Where an eye is that looks into the beams, and what counts there.
+/// Place of an eye that looks into the beams, and the rules that count there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Eye {
     /// How far away it is, m.
     distance: f64,
-    /// Whether groups of shots that cross it count as repeated exposures.
+    /// Set if groups of shots that cross it count as repeated exposures.
     count_groups: bool,
 }
 
-/// What a detector looks at.
+/// Field of a detector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Field {
     /// Solid angle, sr.
     pub solid_angle: f64,
-    /// Where it follows the beam.
+    /// Set if the field follows the beam.
     pub co_scanned: Option<CoScanned>,
 }
 
@@ -62,7 +62,7 @@ pub struct CoScanned {
 }
 
 impl Budget {
-    /// What class 1 allows to a shot; empty where no rule fits the wavelength or the scan.
+    /// Limits of class 1 for a shot; empty if no rule fits the wavelength or the scan.
     pub(super) fn limits(&self, scan: &Scan, light: &Light, emission: &Emission) -> &[Limit] {
         self.limits.get_or_init(|| self.eye.limits(scan, light, emission))
     }
@@ -72,7 +72,7 @@ impl Budget {
         PI * self.aperture.powi(2) / 4.0
     }
 
-    /// What the optics make of light at the aperture: area times transmission, m².
+    /// Effective area of the optics for light at the aperture: area times transmission, m².
     pub fn receiver(&self) -> f64 {
         self.area() * self.transmission
     }
@@ -103,8 +103,8 @@ impl Budget {
     }
 }
 
-/// Filter, m, and field of a coherent receiver: light within its bandwidth, in one mode of an aperture of this diameter.
-/// Of light that is not polarised the mode has half, which the field is made smaller by.
+/// Filter, m, and field of a coherent receiver: light within its bandwidth, in one mode of an aperture of
+/// this diameter. The mode has half of unpolarised light; the field is smaller by that factor.
 fn mode(wavelength: f64, aperture: f64, sample_hz: f64) -> (f64, Field) {
     let filter = wavelength * wavelength * sample_hz / SPEED_OF_LIGHT;
     let solid_angle = wavelength * wavelength / (FRAC_PI_4 * aperture * aperture) / 2.0;
@@ -127,7 +127,7 @@ struct Known {
 }
 
 impl Eye {
-    /// What class 1 allows to a shot before the bare eye, and before one behind a telescope.
+    /// Limits of class 1 for a shot in front of the bare eye, and in front of one behind a telescope.
     fn limits(self, scan: &Scan, light: &Light, emission: &Emission) -> Vec<Limit> {
         let all = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         let is_same = |known: &&Known| {

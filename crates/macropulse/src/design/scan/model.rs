@@ -1,4 +1,4 @@
-//! What every scan pattern answers.
+//! The trait of every scan pattern.
 //!
 //! A pixel is a row and a column of the image. The order of a shot is its place among the shots of
 //! a scan, from 0.
@@ -8,10 +8,10 @@ use crate::design::safety::Beams;
 
 /// How the directions of a scan follow each other.
 pub(crate) trait Model {
-    /// What it is, in a few words for people.
+    /// Name of the pattern, in a few words for people.
     fn summary(&self) -> String;
 
-    /// Rows and columns of the image: as many pixels as a scan has shots.
+    /// Rows and columns of the image: a pixel for each shot of a scan.
     fn size(&self) -> [u32; 2];
 
     /// Number of separate detectors.
@@ -30,13 +30,13 @@ pub(crate) trait Model {
     /// which a shot waits, is left out.
     fn moment(&self, order: u64, period: f64) -> Moment;
 
-    /// Whether a scan is fired shot by shot, all of them equally far apart.
+    /// Tells if a scan is fired shot by shot, all of them equally far apart.
     fn equal_steps(&self) -> bool;
 
     /// Shots of a line: of what is computed together where time allows.
     fn line(&self) -> u64;
 
-    /// Whether one beam draws every line from column 0 on, row by row.
+    /// Tells if one beam draws every line from column 0 on, row by row.
     fn draws_from_the_left(&self) -> bool;
 
     /// Shortest time the beam spends on a pixel, s, `pixel_period` being the mean time between
@@ -47,27 +47,27 @@ pub(crate) trait Model {
     /// macropulse is modelled; `None` where it is not.
     fn moves_by(&self) -> Option<f64>;
 
-    /// Where the pixels lie.
+    /// Directions of the pixels.
     fn directions(&self) -> Directions;
 
     /// The pixel in whose cell a direction lies, rad; `None` outside the field of view. A cell
     /// reaches half of the way to its neighbours.
     fn pixel_at(&self, azimuth: f64, elevation: f64) -> Option<(u16, u16)>;
 
-    /// Width and height, rad, of the cell that belongs to a pixel.
+    /// Width and height, rad, of the cell of a pixel.
     fn cell(&self) -> [f64; 2];
 
     /// All that it looks at.
     fn extent(&self) -> Extent;
 
-    /// Width and height, rad, of the field that a detector behind a moving beam would see if it
-    /// stared; `None` where each detector has pixels of its own.
+    /// Width and height, rad, of the field that a detector behind a moving beam would see if it stared;
+    /// `None` if each detector has pixels of its own.
     fn shared_field(&self) -> Option<[f64; 2]>;
 
-    /// Whether what a detector sees moves on from shot to shot.
+    /// Tells if the view of a detector moves on from shot to shot.
     fn follows(&self) -> bool;
 
-    /// What it sends, as eye safety counts it.
+    /// The emitted beams, as eye safety counts them.
     fn beams(&self) -> Beams;
 
     /// How much is added to what each row measures, m, because its clock starts too late
@@ -76,7 +76,7 @@ pub(crate) trait Model {
         &[]
     }
 
-    /// Whether pixels are cells of an image that is the same in every scan.
+    /// Tells if pixels are cells of an image that is the same in every scan.
     fn is_lattice(&self) -> bool {
         true
     }
@@ -86,7 +86,7 @@ pub(crate) trait Model {
         None
     }
 
-    /// What a user should know about it although it is no error.
+    /// Remarks for the user that are no errors.
     fn notes(&self) -> &[String] {
         &[]
     }
@@ -111,7 +111,7 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Of a field of `sides` rad, width and height, about the forward direction.
+    /// The field of `sides` rad, width and height, about the forward direction.
     pub(super) fn centred(sides: [f64; 2]) -> Self {
         let [azimuth, elevation] = sides.map(|side| [-side / 2.0, side / 2.0]);
         Self { azimuth, elevation }
