@@ -168,7 +168,8 @@ fn sunlight_brings_next_to_nothing_to_a_mode() {
     assert!((per_mode / 6.5e-6 - 1.0).abs() < 0.02, "{per_mode}");
 }
 
-/// A forecast refuses effects that it does not model, and a fault in a file is told in one sentence with its key.
+/// A forecast refuses effects that it does not model. A fault in a file gives one sentence that names its
+/// key.
 #[test]
 fn what_does_not_go_together_is_refused() {
     let straying = sensor(&[

@@ -200,8 +200,7 @@ impl<'a> Forecaster<'a> {
     pub fn worst(&self, reflectance: f64, farthest: f64) -> Forecast {
         let mut worst = self.forecast(reflectance, farthest);
         let Some(own) = self.own_light(farthest) else { return worst };
-        // Two ranges at which the same numbers of marks are told differ only in light: the farther one has
-        // less.
+        // Two ranges with the same numbers of visible marks differ only in light. The farther one has less.
         let mut looked_at = BTreeSet::new();
         for (range, told) in own.each_change(self.design.scan.min_range, farthest) {
             let mut sorted = told.clone();

@@ -184,7 +184,7 @@ impl OwnLight {
         range_from_tof(late as f64 / self.ticks_per_s)
     }
 
-    /// The number of marks of each shot that are told, for an echo that comes `late` ticks later.
+    /// The number of visible marks of each shot, if its echo comes `late` ticks later.
     fn told(&self, late: i64) -> Vec<usize> {
         let is_told = |mark: &&i64| {
             let place = **mark + late;
@@ -295,7 +295,8 @@ mod tests {
         let own = OwnLight::of_words(&narrow, &words, blind, tof_from_range(150.0));
         let same = OwnLight::of(&narrow, Some(blind), tof_from_range(150.0));
         assert!(own.each_told(1.0, 150.0).eq(same.each_told(1.0, 150.0)));
-        // Each change appears with all that is told, at the farthest range of its stretch.
+        // Each change lists the visible marks of all shots. Its range is the farthest of those with the same
+        // marks.
         let mut all: Vec<_> = own.each_told(1.0, 150.0).collect();
         all.dedup_by(|next, before| next.1 == before.1);
         let mut changes: Vec<_> = own.each_change(1.0, 150.0).collect();

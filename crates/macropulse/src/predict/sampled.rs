@@ -132,8 +132,8 @@ pub(super) fn blind(sampled: &Sampled, sampling: &Sampling, background: f64) -> 
     Blind::of(sampling, sampled.stray_shows(background) / sampled.sample)
 }
 
-/// The findings of the receiver of `design` for marks of this number of `photons`, under `background`
-/// detections per second, if `told` lists the numbers of marks that are told of some shots.
+/// The findings of the receiver of `design` for marks of `photons` each, under `background` detections per
+/// second. `told` lists the numbers of visible marks of some shots.
 pub(super) fn chances(
     (design, sampled, settings): (&Design, &Sampled, &decode::Sampled),
     points: &[Points],

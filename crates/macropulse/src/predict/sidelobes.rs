@@ -1,9 +1,9 @@
 //! Probability that a return is taken for a sidelobe of its own macropulse, in closed form.
 //!
-//! Shifted by some chips, A of the N marks of a macropulse fall upon others of it. The part of those that is
-//! found counts at the sidelobe as at the peak. At the peak the other d = N − A marks count, too, X of which
-//! are found, X ~ Bin(d, p). At the sidelobe Y of as many places are lit by chance, Y ~ Bin(d, q). The
-//! sidelobe is taken if Y > X; if both are the same, neighbours decide.
+//! If a macropulse is shifted by some chips, A of its N marks fall upon others of it. Those of them that are
+//! found count at the sidelobe as at the peak. The other d = N − A marks count at the peak only: X of them
+//! are found, X ~ Bin(d, p). At the sidelobe, chance lights Y of the same number of places, Y ~ Bin(d, q).
+//! The sidelobe is taken if Y > X. If both are the same, neighbours decide.
 //!
 //! The returns that come first have no neighbours. If two lags have the same number of marks they take the
 //! nearer one: the sidelobe on one side of the peak. They may mislead those about them, and to what extent is

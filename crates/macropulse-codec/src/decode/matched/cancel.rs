@@ -479,9 +479,9 @@ impl Canceller<'_> {
 /// twice as long; without it a clean one takes a third longer, as some macropulses of each pane begin under others.
 pub(super) const CLUE: usize = 8;
 
-/// Ticks of overlapping macropulses are laid down for the length of one macropulse, and this part of it more. With a
-/// whole length more a clean `street` takes 1 % longer, as many overlap with one other alone. A tenth makes no
-/// difference.
+/// Ticks of overlapping macropulses are laid down for the length of one macropulse, and this part of it more. A whole
+/// length more costs a clean `street` 1 % of its time: many macropulses overlap with one other alone. A tenth makes
+/// no difference.
 const MORE: i64 = 4;
 
 /// Macropulses that fit into the stretch of time that is laid down where they overlap: it is moved on

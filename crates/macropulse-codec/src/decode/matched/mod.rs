@@ -4,8 +4,8 @@
 //! mark takes tens of microseconds a shot; so the receiver cancels light that it has explained, as multi-user detectors do,
 //! and looks first where light is likely:
 //!
-//! 1. [`cancel`]: macropulses of which every mark is there are taken off the stream of ticks one after another: no lag
-//!    can have more. In clear light this is all.
+//! 1. [`cancel`]: complete macropulses are taken off the stream of ticks one after another: no lag can have
+//!    more marks. In clear light this is all.
 //! 2. [`track`]: neighbouring pixels see neighbouring ranges. About them the exact maximum is taken;
 //!    it is kept at once if as large a share of the marks is found as of the shots before.
 //! 3. [`acquire`]: the exact maximum over the gate, of shots that no neighbour predicts and of those
