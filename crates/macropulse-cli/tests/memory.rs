@@ -54,9 +54,10 @@ fn an_estimate_is_near_what_a_run_takes() {
     }
 }
 
+/// Prints the table of docs/hardening.md. Where most shots are missed, as of coded-360 at the wall, less is taken.
 #[test]
-#[ignore = "takes minutes: prints the table of docs/hardening.md"]
-fn the_table_of_the_book() {
+#[ignore = "slow: before a release"]
+fn every_sensor_takes_about_what_is_estimated() {
     let desk = Desk::new();
     println!("| sensor | scene | estimated, MB | taken, MB | ratio |\n|---|---|---|---|---|");
     let listed = desk.json("sensors --json");
@@ -71,6 +72,7 @@ fn the_table_of_the_book() {
                 estimated * 1e-6,
                 taken * 1e-6
             );
+            assert!((0.7..2.0).contains(&ratio), "{sensor} in {scene}");
         }
     }
 }

@@ -9,6 +9,7 @@ use common::Desk;
 /// `docs/validation.md` is what the command writes. Where that changes, copy it:
 /// `macropulse validate -o validation && cp validation/validation.md docs/`.
 #[test]
+#[ignore = "slow: before a release"]
 fn the_page_of_the_guide_is_what_the_command_writes() {
     let desk = Desk::new();
     let ran = desk.run("validate -o out --json");

@@ -132,10 +132,11 @@ def test_directions_are_unit_vectors():
 
 
 def test_ready_ones_can_all_be_opened(program):
+    sensors, scenes = program.run("sensors"), program.run("scenes")
     for name in mp.sensors():
-        assert mp.Sensor(name).name == name and name in program.run("sensors")
+        assert mp.Sensor(name).name == name and name in sensors
     for name in mp.scenes():
-        assert mp.Scene(name).name and name in program.run("scenes")
+        assert mp.Scene(name).name and name in scenes
     for name in mp.environments():
         assert name in mp.Scene("wall", {"environment": name}).environment
 

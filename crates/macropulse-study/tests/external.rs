@@ -5,7 +5,8 @@
 
 use std::sync::LazyLock;
 
-use macropulse_study::validate::{Figure, Within, published};
+use macropulse::sim::Watch;
+use macropulse_study::validate::{Figure, Findings, Within, places, published};
 
 static PUBLISHED: LazyLock<Vec<Figure>> = LazyLock::new(|| published().unwrap());
 
@@ -52,4 +53,23 @@ fn no_topic_and_no_source_is_left_out() {
         let found = PUBLISHED.iter().filter(of).count();
         assert!(found >= least, "{found} of {topic}, {source}");
     }
+}
+
+/// Published figures stand on the page as they come out, and so do the forecasts of one sensor; those of all sensors
+/// take minutes and are compared before a release.
+#[test]
+fn published_figures_stand_on_the_page() {
+    let page = include_str!("../../../docs/validation.md");
+    let watch = Watch { done: &|_| (), stop: &|| false };
+    let forecasts = places("vlp-16", 1, &watch).unwrap();
+    let findings = Findings { seed: 1, published: PUBLISHED.clone(), forecasts };
+    let written = findings.markdown();
+    let [before, written_before] =
+        [page, &*written].map(|text| text.split_once("## Codes").unwrap().1);
+    let [(figures, rows), (written_figures, written_rows)] =
+        [before, written_before].map(|text| text.split_once("## Forecasts").unwrap());
+    assert_eq!(figures, written_figures);
+    let of_sensor = written_rows.lines().filter(|row| row.starts_with("| vlp-16 |"));
+    let missing: Vec<_> = of_sensor.clone().filter(|row| !rows.contains(row)).collect();
+    assert!(of_sensor.count() > 2 && missing.is_empty(), "{missing:#?}");
 }

@@ -40,6 +40,7 @@ mod scene_given;
 mod scene_meshes;
 mod several_returns;
 mod shapes;
+mod slow;
 mod threads;
 mod timing;
 mod turning_heads;

@@ -142,6 +142,7 @@ fn counters_tell_reflectance_or_that_they_cannot() {
 }
 
 #[test]
+#[ignore = "slow: before a release"]
 fn a_counter_whose_photons_come_apart_tells_reflectance() {
     tell(&["kim-park-2016-physical"]);
 }

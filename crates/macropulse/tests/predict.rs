@@ -97,45 +97,53 @@ fn detected(scan: &Scan) -> (u64, u64) {
     (score.count(Outcome::Right) + score.count(Outcome::Near), score.with_echo())
 }
 
-/// N = 1694 lit shots in each case, seed 1. Control: the forecast for twice the light is rejected
-/// wherever detection is neither certain nor hopeless.
-#[test]
-fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
+/// Places, range and reflectance, in an environment: N = 1694 lit shots in each case, seed 1. Control: the forecast
+/// for twice the light is rejected wherever detection is neither certain nor hopeless. Returns in how many cases.
+fn paper_fails_as_predicted(environment: &str, places: &[(f64, f64)]) -> usize {
     // Where the light is faint a sidelobe may win, up to 0.3 m farther: not beyond the gate.
     let keys = [("receiver.effort", "\"thorough\""), ("scan.gate_beyond_m", "1.0")];
     let design = sensor("kim-park-2016-physical", &keys);
+    let sky = Environment::named(environment).unwrap();
     let mut graded = 0;
-    for name in ["clear-day", "night"] {
-        let sky = Environment::named(name).unwrap();
-        let places =
-            [(10.0, 1.0), (150.0, 1.0), (20.0, 1.0), (50.0, 1.0), (150.0, 0.8), (150.0, 0.6)];
-        // By day it sees nothing, which takes long to find out.
-        let places = if name == "clear-day" { &places[..2] } else { &places };
-        for &(range, white) in places {
-            let forecaster = Forecaster::new(&design, &sky).unwrap();
-            let predicted = forecaster.forecast(white, range).pd;
-            let room = room(range * 0.9999, white, name);
-            let (found, shots) = detected(&measure(&design, &room, 1, 1));
-            assert!(
-                agrees(found, shots, predicted),
-                "{name}, {range} m: {found} of {shots}, predicted {predicted}"
-            );
-            if name == "clear-day" {
-                assert_eq!(found, 0, "{range} m: sunlight in every chip");
-            }
-            if (0.001..0.999).contains(&predicted) {
-                let brighter = forecaster.with_light(2.0).forecast(white, range).pd;
-                assert!(!agrees(found, shots, brighter), "{name}, {range} m: {brighter}");
-                graded += 1;
-            }
+    for &(range, white) in places {
+        let forecaster = Forecaster::new(&design, &sky).unwrap();
+        let predicted = forecaster.forecast(white, range).pd;
+        let room = room(range * 0.9999, white, environment);
+        let (found, shots) = detected(&measure(&design, &room, 1, 1));
+        assert!(
+            agrees(found, shots, predicted),
+            "{environment}, {range} m: {found} of {shots}, predicted {predicted}"
+        );
+        if environment == "clear-day" {
+            assert_eq!(found, 0, "{range} m: sunlight in every chip");
+        }
+        if (0.001..0.999).contains(&predicted) {
+            let brighter = forecaster.with_light(2.0).forecast(white, range).pd;
+            assert!(!agrees(found, shots, brighter), "{environment}, {range} m: {brighter}");
+            graded += 1;
         }
     }
+    graded
+}
+
+#[test]
+fn the_sensor_of_the_paper_fails_as_predicted_with_honest_light() {
+    let graded = paper_fails_as_predicted("night", &[(10.0, 1.0), (150.0, 0.8), (150.0, 0.6)]);
     assert!(graded >= 2, "{graded} cases can tell right from wrong");
+}
+
+/// By day it sees nothing, which takes long to find out.
+#[test]
+#[ignore = "slow: before a release"]
+fn the_sensor_of_the_paper_fails_by_day_as_predicted() {
+    paper_fails_as_predicted("clear-day", &[(10.0, 1.0), (150.0, 1.0)]);
+    paper_fails_as_predicted("night", &[(20.0, 1.0), (50.0, 1.0), (150.0, 1.0)]);
 }
 
 /// N = 1694 lit shots, seed 1: where every fifth place is lit by the sun the forecast is right to a tenth, 0.282 where
 /// 0.270 is found. Control: without its sunlight it is far off.
 #[test]
+#[ignore = "slow: before a release"]
 fn in_dense_light_the_forecast_is_right_to_a_tenth() {
     let set = [("optics.field", "\"in-flight\""), ("receiver.effort", "\"thorough\"")];
     let design = sensor("kim-park-2016-physical", &set);

@@ -69,15 +69,16 @@ impl Desk {
         serde_json::from_str(&self.bash(command)?).map_err(|why| format!("`{command}`: {why}"))
     }
 
-    /// That every `macropulse` at the beginning of one of `commands` knows its options.
+    /// That every `macropulse` at the beginning of one of `commands` knows its options. A variable stands for its name.
     ///
     /// # Errors
     /// What it said.
     pub fn parse(&self, commands: &str) -> Result<(), String> {
         let whole = commands.replace("\\\n", " ");
-        let ours = whole.lines().map(|line| line.trim_start_matches("$ "));
+        let ours = whole.lines().map(|line| line.trim_start().trim_start_matches("$ "));
         for line in ours.filter(|line| line.starts_with("macropulse ")) {
             let (_, words) = line.split_once(' ').unwrap_or_default();
+            let words = words.replace('$', "");
             self.bash(&format!("asked() {{ macropulse \"$@\" --help; }}\nasked {words}"))?;
         }
         Ok(())
@@ -127,7 +128,9 @@ fn options_that_there_are_not_are_noticed_without_a_run() {
     let desk = desk();
     desk.parse("ros2 bag play\nmacropulse sweep peregrine \\\n  --shots 5 -o out   # later")
         .unwrap();
-    let why = desk.parse("$ macropulse sweep peregrine --shoots 5").unwrap_err();
-    assert!(why.contains("--shoots"), "{why}");
+    for wrong in ["$ macropulse sweep $sensor --shoots 5", "do\n    macropulse sweep --shoots 5"] {
+        let why = desk.parse(wrong).unwrap_err();
+        assert!(why.contains("--shoots"), "{why}");
+    }
     assert!(desk.parse("macropulse sweeps peregrine").is_err());
 }

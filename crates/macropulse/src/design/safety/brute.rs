@@ -300,26 +300,34 @@ fn drawn(number: u64) -> Design {
     design.unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
-/// N = 200 sensors of all patterns, seeds 2000 to 2199, and five that simpler searches allowed too much: 1.06, 1.02
+/// Sensors of all patterns with such seeds for which more than [`TOLERANCE`] too much is allowed, and by how much.
+fn over(seeds: impl Iterator<Item = u64>) -> Vec<(u64, f64)> {
+    let excess = seeds.map(|number| {
+        let design = drawn(number);
+        // Every other one behind a telescope.
+        let conditions = conditions(&design);
+        let condition = match number {
+            2000.. => &conditions[(number / 4 % 2) as usize..][..1],
+            _ => &conditions[..],
+        };
+        (number, excess(&design, condition))
+    });
+    excess.filter(|(_, over)| *over > TOLERANCE).collect()
+}
+
+/// N = 32 sensors, seeds 2000 to 2031, and five that simpler searches allowed too much: 1.06, 1.02
 /// and 1.03 times as much from the places of a grid alone, 1.05 without places that one more beam grazes, and 1.03 where
 /// three places of each rule were refined.
 #[test]
 fn no_place_of_a_grid_allows_less_than_the_search() {
-    let over: Vec<(u64, f64)> = (2000..2200)
-        .chain([1, 498, 504, 237, 1667])
-        .map(|number| {
-            let design = drawn(number);
-            // Every other one behind a telescope.
-            let conditions = conditions(&design);
-            let condition = match number {
-                2000.. => &conditions[(number / 4 % 2) as usize..][..1],
-                _ => &conditions[..],
-            };
-            (number, excess(&design, condition))
-        })
-        .filter(|(_, over)| *over > TOLERANCE)
-        .collect();
-    assert!(over.is_empty(), "{over:?}");
+    assert_eq!(over((2000..2032).chain([1, 498, 504, 237, 1667])), []);
+}
+
+/// N = 200 sensors, seeds 2000 to 2199.
+#[test]
+#[ignore = "slow: before a release"]
+fn no_place_of_a_grid_allows_less_for_200_sensors() {
+    assert_eq!(over(2000..2200), []);
 }
 
 #[test]
