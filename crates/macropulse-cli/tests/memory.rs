@@ -54,7 +54,8 @@ fn an_estimate_is_near_what_a_run_takes() {
     }
 }
 
-/// Prints the table of docs/hardening.md. Where most shots are missed, as of coded-360 at the wall, less is taken.
+/// Prints the table of docs/hardening.md. An estimate may be too high, as of coded-360 at the wall, of which most shots
+/// are missed; one that is too low would break the limit.
 #[test]
 #[ignore = "slow: before a release"]
 fn every_sensor_takes_about_what_is_estimated() {
@@ -72,7 +73,7 @@ fn every_sensor_takes_about_what_is_estimated() {
                 estimated * 1e-6,
                 taken * 1e-6
             );
-            assert!((0.7..2.0).contains(&ratio), "{sensor} in {scene}");
+            assert!(ratio >= *NEAR.start(), "{sensor} in {scene}: {ratio:.2}");
         }
     }
 }
