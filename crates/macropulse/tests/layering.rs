@@ -285,7 +285,7 @@ impl Layers {
 }
 
 /// Every Rust source in `folder` and below.
-fn sources_below(folder: PathBuf) -> Vec<PathBuf> {
+pub(crate) fn sources_below(folder: PathBuf) -> Vec<PathBuf> {
     let (mut folders, mut files) = (vec![folder], Vec::new());
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).into_iter().flatten() {

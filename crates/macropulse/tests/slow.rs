@@ -5,22 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::layering::sources_below;
+
 const SLOW: &str = "#[ignore = \"slow: before a release\"]";
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-/// All files of `folder` that are written in Rust.
-fn sources(folder: &Path, found: &mut Vec<String>) {
-    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
-        let path = entry.path();
-        if path.is_dir() && path.file_name().unwrap() != "target" {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            found.push(fs::read_to_string(path).unwrap());
-        }
-    }
 }
 
 /// The name of the function that is defined in `line`.
@@ -31,10 +21,9 @@ fn function(line: &str) -> Option<&str> {
 
 /// Names of tests, and whether each is slow. Pages of the guide are tests that a macro makes.
 fn tests() -> BTreeMap<String, bool> {
-    let mut files = Vec::new();
-    sources(&root().join("crates"), &mut files);
     let mut tests = BTreeMap::new();
-    for text in files {
+    for file in sources_below(root().join("crates")) {
+        let text = fs::read_to_string(file).unwrap();
         let mut is_slow = None;
         for line in text.lines() {
             match line.trim() {

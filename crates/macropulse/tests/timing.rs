@@ -212,7 +212,7 @@ fn against_forecast(design: &Design, environment: &str, (of_range, shift): (&[Su
     (found / forecast).sqrt()
 }
 
-/// Sensors with a code, and with what probability they see faint light of which the mean error is tried.
+/// Coded sensors, and the probabilities of detection at which the mean error of their ranges is measured.
 ///
 /// FIXME: of coded-360 what is seen once in three shots is 0.11 to 0.12 ticks too near.
 const FAINT: [(&str, &[f64]); 5] = [

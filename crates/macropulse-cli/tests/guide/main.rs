@@ -91,7 +91,7 @@ fn every_page_is_tried() {
     assert_eq!(tried, there);
 }
 
-/// What needs no run is tried every time: every command of a page has the options that the page gives it.
+/// Slow pages are not run every time, but each of their commands is parsed: it has the options that the page gives it.
 #[test]
 fn commands_of_slow_pages_exist() {
     for name in SLOW {
