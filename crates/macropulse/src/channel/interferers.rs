@@ -20,6 +20,7 @@
 //!
 //! All of it is where it is when the shot is fired.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use super::{ALL_MARKS, Light, Link, PulseTrain, PulseTrains};
@@ -55,17 +56,16 @@ pub(super) fn add(
 ) {
     let (design, other) = (pair.to.design, pair.from.design);
     let Some(link) = Link::of_interferer(design, other, &scene.environment) else { return };
-    let around_fs = around_fs(&pair.from);
+    let view = View::of(design, log, around_fs(&pair.from));
     let farthest = design.scan.light_range.max(other.scan.light_range);
     let mut direct = Direct::of(scene, pair, 2.0 * farthest);
     let finishes = scene.finishes(other.light.wavelength);
     let longest_fs = fs_from_s(tof_from_range(farthest));
-    for open in listening(design, log, around_fs) {
-        let channel = |pixel| channel_of(design, log, pixel);
+    for open in view.listening() {
         let mut arrivals = Arrivals {
             transmitter: number,
             link,
-            channel: &channel,
+            view: &view,
             pulses: pulses_of(&pair.from),
             open: open.clone(),
             trains: &mut light.trains,
@@ -76,8 +76,7 @@ pub(super) fn add(
                 if !open.contains(&arrives_fs) {
                     return None;
                 }
-                let pixel = design.scan.pixel_at(direction)?;
-                listens(design, log, (arrives_fs, pixel), around_fs).then_some(pixel)
+                view.pixel(direction, arrives_fs)
             };
             let lit = scene.illuminated(pair, &theirs, farthest, &look);
             arrivals.add_reflected(&finishes, &theirs, &lit);
@@ -110,50 +109,97 @@ fn pulses_of(other: &Mount<'_>) -> (u64, f64) {
     })
 }
 
-/// When first chips may arrive that the receiver of `log` can see light of, fs, if there is light
-/// so long `before` and `after` them. Ascending, and apart.
-fn listening(design: &Design, log: &ShotLog, (before, after): (i64, i64)) -> Vec<Range<i64>> {
-    let jitter_fs = design.most_jitter_fs();
-    let listening_fs = design.listening_fs();
-    let mut open: Vec<Range<i64>> = Vec::new();
-    for fired_fs in &log.fired_at_fs {
-        let span = fired_fs - after - jitter_fs..fired_fs + listening_fs + before + jitter_fs;
-        match open.last_mut() {
-            Some(last) if span.start <= last.end => last.end = span.end,
-            _ => open.push(span),
+/// The pixels of a sensor, and the times at which their detectors receive light.
+struct View<'a> {
+    design: &'a Design,
+    log: &'a ShotLog,
+    /// Light is received that begins this long before a detector stops to listen, or ends this long after it starts, fs.
+    around_fs: (i64, i64),
+    /// Squared chord of the unit sphere to the edge of a field about its axis.
+    edge: f64,
+}
+
+impl<'a> View<'a> {
+    fn of(design: &'a Design, log: &'a ShotLog, around_fs: (i64, i64)) -> Self {
+        let [width, height] = design.scan.model().cell();
+        let angle = (width * height / PI).sqrt();
+        let edge = (2.0 * libm::sin(angle / 2.0)).powi(2);
+        Self { design, log, around_fs, edge }
+    }
+
+    /// The times at which first chips may arrive whose light is received, fs. Ascending, and apart.
+    fn listening(&self) -> Vec<Range<i64>> {
+        let jitter_fs = self.design.most_jitter_fs();
+        let mut open: Vec<Range<i64>> = Vec::new();
+        for shot in 0..self.log.len() {
+            let Range { start, end } = self.gate(shot);
+            let span = start - jitter_fs..end + jitter_fs;
+            match open.last_mut() {
+                Some(last) if span.start <= last.end => last.end = span.end,
+                _ => open.push(span),
+            }
         }
+        open
     }
-    open
-}
 
-/// Whether the detector of a pixel listens when light arrives that begins so long `before` and
-/// ends so long `after` that. One that all pixels share does, unless its field follows the beam and
-/// has not come to the pixel or has left it.
-fn listens(
-    design: &Design,
-    log: &ShotLog,
-    (arrives_fs, pixel): (i64, (u16, u16)),
-    (before, after): (i64, i64),
-) -> bool {
-    let opens = |shot: usize| log.fired_at_fs[shot] - after;
-    let closes = |shot: usize| log.fired_at_fs[shot] + design.listening_fs() + before;
-    let field = design.budget.as_ref().map(|budget| budget.field);
-    if let Some(field) = field.filter(|field| field.co_scanned.is_some()) {
-        return shot_at(design, log, pixel).is_some_and(|shot| {
-            let since_fs = arrives_fs - log.fired_at_fs[shot];
-            since_fs >= 0 && field.share(s_from_fs(since_fs)) > 0.0
+    /// The times at which first chips may arrive that are received with a shot, fs.
+    fn gate(&self, shot: usize) -> Range<i64> {
+        let (before, after) = self.around_fs;
+        let fired_fs = self.log.fired_at_fs[shot];
+        fired_fs - after..fired_fs + self.design.listening_fs() + before
+    }
+
+    /// The pixel that receives light from the unit vector `direction` in the frame of the sensor, if its first
+    /// chip arrives at `arrives_fs`.
+    fn pixel(&self, direction: [f64; 3], arrives_fs: i64) -> Option<(u16, u16)> {
+        if self.design.scan.has_image() {
+            let pixel = self.design.scan.pixel_at(direction)?;
+            return self.receives(pixel, arrives_fs).then_some(pixel);
+        }
+        self.nearest(direction, arrives_fs)
+    }
+
+    /// The pixel of the shot whose axis is nearest to `direction`, of a pattern whose field of view follows the
+    /// beam: a cone about the axis, with the solid angle of a cell.
+    fn nearest(&self, direction: [f64; 3], arrives_fs: i64) -> Option<(u16, u16)> {
+        let fired_at_fs = &self.log.fired_at_fs;
+        let first = fired_at_fs.partition_point(|fired_fs| {
+            fired_fs + self.design.listening_fs() + self.around_fs.0 <= arrives_fs
         });
+        let mut nearest = (self.edge, None);
+        for shot in (first..self.log.len()).take_while(|&shot| self.gate(shot).start <= arrives_fs)
+        {
+            let axis = self.design.directions().of_shot(self.log, shot);
+            let chord = (0..3).map(|i| (axis[i] - direction[i]).powi(2)).sum::<f64>();
+            let pixel = (self.log.row[shot], self.log.column[shot]);
+            if chord < nearest.0 && self.receives(pixel, arrives_fs) {
+                nearest = (chord, Some(pixel));
+            }
+        }
+        nearest.1
     }
-    design.channels() == 1
-        || shot_at(design, log, pixel)
-            .is_some_and(|shot| (opens(shot)..closes(shot)).contains(&arrives_fs))
-}
 
-/// The channel whose detector looks at the cell of `pixel`.
-fn channel_of(design: &Design, log: &ShotLog, pixel: (u16, u16)) -> u16 {
-    match design.channels() {
-        1 => 0,
-        _ => shot_at(design, log, pixel).map_or(0, |shot| log.channel[shot]),
+    /// Tells if the detector of `pixel` receives light whose first chip arrives at `arrives_fs`. A detector that
+    /// all pixels share always does, unless its field of view follows the beam and is not at the pixel.
+    fn receives(&self, pixel: (u16, u16), arrives_fs: i64) -> bool {
+        let shot = || shot_at(self.design, self.log, pixel);
+        let field = self.design.budget.as_ref().map(|budget| budget.field);
+        if let Some(field) = field.filter(|field| field.co_scanned.is_some()) {
+            return shot().is_some_and(|shot| {
+                let since_fs = arrives_fs - self.log.fired_at_fs[shot];
+                since_fs >= 0 && field.share(s_from_fs(since_fs)) > 0.0
+            });
+        }
+        self.design.channels() == 1
+            || shot().is_some_and(|shot| self.gate(shot).contains(&arrives_fs))
+    }
+
+    /// The channel whose detector sees `pixel`.
+    fn channel(&self, pixel: (u16, u16)) -> u16 {
+        match self.design.channels() {
+            1 => 0,
+            _ => shot_at(self.design, self.log, pixel).map_or(0, |shot| self.log.channel[shot]),
+        }
     }
 }
 
@@ -247,8 +293,7 @@ impl Sight {
 struct Arrivals<'a> {
     transmitter: u16,
     link: Link,
-    /// The channel that looks at a pixel.
-    channel: &'a dyn Fn((u16, u16)) -> u16,
+    view: &'a View<'a>,
     /// As [`pulses_of`]: each becomes a train of its own.
     pulses: (u64, f64),
     /// When first chips may arrive, fs.
@@ -302,7 +347,7 @@ impl Arrivals<'_> {
         let first_fs = log.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT);
         let train = PulseTrain {
             transmitter: self.transmitter,
-            channel: (self.channel)(pixel),
+            channel: self.view.channel(pixel),
             arrives_fs: first_fs,
             photons,
             label: log.label[shot],
@@ -403,11 +448,11 @@ mod tests {
         let design =
             Design::open("hdl-64e", &[("scan.scans_per_s".into(), "0.01".into())]).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 3 }.shot_log(&design);
-        let open = listening(&design, &log, (5, 7));
+        let open = View::of(&design, &log, (5, 7)).listening();
         assert_eq!(open.len(), 3);
         assert!(open.iter().zip(&log.fired_at_fs).all(|(open, fired)| open.contains(fired)));
         let close = Design::open("kim-park-2016", &[]).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 3 }.shot_log(&close);
-        assert_eq!(listening(&close, &log, (5, 7)).len(), 1);
+        assert_eq!(View::of(&close, &log, (5, 7)).listening().len(), 1);
     }
 }

@@ -51,19 +51,8 @@ impl Operating {
     /// The sensor `design` in `scene`.
     ///
     /// # Errors
-    /// As [`Operating::of`]; and if the scene has other lidars and the sensor has a scan pattern that is no
-    /// lattice: which pixel looks where is known of lattices alone.
+    /// As [`Operating::of`]; and if another lidar of the scene sends no pulses.
     pub fn in_scene(design: &Design, scene: &Scene) -> Result<Self, Error> {
-        if !scene.interferers.is_empty() && !design.scan.model().is_lattice() {
-            return Err(Error {
-                sensor: design.name.clone(),
-                environment: scene.name.clone(),
-                message:
-                    "light of other lidars is received by scan patterns of rows and columns alone: \
-                          take [[interferers]] out of the scene, or choose another sensor"
-                        .to_owned(),
-            });
-        }
         let is_modulated = |one: &&Interferer| !one.design.emission.is_pulsed();
         if let Some(modulated) = scene.interferers.iter().find(is_modulated) {
             return Err(Error {
