@@ -1,5 +1,7 @@
 //! The codebook: the marks of every macropulse a sensor can send.
 
+use std::collections::HashMap;
+
 use super::correlation::aperiodic;
 use super::{CodeWord, Error, Family, Payload};
 
@@ -84,14 +86,15 @@ impl Codebook {
         let mut starts = vec![0];
         let mut sidelobes = Vec::new();
         let (mut all_lit, mut lit_starts) = (Vec::new(), vec![0]);
-        let shapes: Vec<Shapes> = words.iter().map(|word| Shapes::of(word, keying)).collect();
+        let mut shapes: Vec<Shapes> = words.iter().map(|word| Shapes::of(word, keying)).collect();
         for label in 0..labels {
             let lit = lit_bits(label);
             let is_lit: Vec<bool> = (0..bits).map(|bit| lit.contains(&bit)).collect();
+            let counts = BitCounts::of(&is_lit);
             all_lit.extend(lit.iter().map(|bit| bit * length));
             lit_starts.push(all_lit.len() as u32);
-            for shapes in &shapes {
-                sidelobes.push(shapes.highest_sidelobe(&is_lit));
+            for shapes in &mut shapes {
+                sidelobes.push(shapes.highest_sidelobe(counts));
                 for (bit, &is_lit) in (0..).zip(&is_lit) {
                     let first = (bit * length) as u16;
                     marks.extend(shapes.of_bit(is_lit).map(|mark| first + mark));
@@ -238,6 +241,28 @@ struct Shapes {
     alone: [Vec<u16>; 2],
     /// What each shares at each positive lag with each of them that follows it.
     follower: [[Vec<u16>; 2]; 2],
+    /// The highest sidelobes of macropulses so far.
+    highest: HashMap<BitCounts, u16>,
+}
+
+/// The counts of bits that the sidelobes of a macropulse follow from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct BitCounts {
+    /// Bits, by value.
+    alone: [u16; 2],
+    /// Bits that follow each other, by both values.
+    pairs: [[u16; 2]; 2],
+}
+
+impl BitCounts {
+    fn of(is_lit: &[bool]) -> Self {
+        let mut counts = Self { alone: [0; 2], pairs: [[0; 2]; 2] };
+        is_lit.iter().for_each(|&bit| counts.alone[usize::from(bit)] += 1);
+        is_lit.windows(2).for_each(|pair| {
+            counts.pairs[usize::from(pair[0])][usize::from(pair[1])] += 1;
+        });
+        counts
+    }
 }
 
 impl Shapes {
@@ -256,7 +281,7 @@ impl Shapes {
         let alone = [0, 1].map(|bit| shared(&bits[bit], &bits[bit], 0));
         let follower =
             [0, 1].map(|one| [0, 1].map(|other| shared(&bits[one], &bits[other], length)));
-        Self { bits, alone, follower }
+        Self { bits, alone, follower, highest: HashMap::new() }
     }
 
     /// The marks of a bit, from its first chip on.
@@ -264,22 +289,21 @@ impl Shapes {
         self.bits[usize::from(is_lit)].iter().flat_map(|word| word.marks.iter().copied())
     }
 
-    /// The highest sidelobe of a macropulse of these bits, shifted by less than a code word.
-    fn highest_sidelobe(&self, is_lit: &[bool]) -> u16 {
-        let mut counts = [0_u16; 2];
-        let mut pairs = [[0_u16; 2]; 2];
-        is_lit.iter().for_each(|&bit| counts[usize::from(bit)] += 1);
-        is_lit.windows(2).for_each(|pair| {
-            pairs[usize::from(pair[0])][usize::from(pair[1])] += 1;
-        });
-        let lobes = self.alone.iter().zip(counts);
-        let lobes = lobes.chain(self.follower.iter().flatten().zip(pairs.into_iter().flatten()));
-        let mut sums = Vec::new();
-        for (shared, count) in lobes.filter(|(shared, count)| !shared.is_empty() && *count > 0) {
-            sums.resize(shared.len(), 0);
-            sums.iter_mut().zip(shared).for_each(|(sum, shared)| *sum += count * shared);
-        }
-        sums.into_iter().max().unwrap_or(0)
+    /// The highest sidelobe of a macropulse with these bits, shifted by less than a code word.
+    fn highest_sidelobe(&mut self, counts: BitCounts) -> u16 {
+        let Self { alone, follower, highest, .. } = self;
+        *highest.entry(counts).or_insert_with(|| {
+            let lobes = alone.iter().zip(counts.alone);
+            let pairs = counts.pairs.into_iter().flatten();
+            let lobes = lobes.chain(follower.iter().flatten().zip(pairs));
+            let mut sums = Vec::new();
+            for (shared, count) in lobes.filter(|(shared, count)| !shared.is_empty() && *count > 0)
+            {
+                sums.resize(shared.len(), 0);
+                sums.iter_mut().zip(shared).for_each(|(sum, shared)| *sum += count * shared);
+            }
+            sums.into_iter().max().unwrap_or(0)
+        })
     }
 }
 

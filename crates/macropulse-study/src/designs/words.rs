@@ -1,5 +1,7 @@
 //! The words of a candidate: of those that are tried the ones of which fewest echoes are lost to own light.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use macropulse::codec::code::{CodeWord, Family, Separated};
 use macropulse::design::Design;
 use macropulse::predict::verdict::slant;
@@ -83,10 +85,13 @@ impl Requirements {
             let lasts = f64::from(length) * self.chip();
             let later = ((tof_from_range(self.wanted.range_m) + lasts) / period) as u32;
             let later = later.min(MOST_LATER);
+            let limit = AtomicUsize::new(best.map_or(usize::MAX, |(lost, _)| lost.at_worst));
             let of = |seed: u64| {
                 let words = Separated { length, later, seed, ..shortest };
                 let family = Family::separated(words).ok()?;
-                Some((self.lost(&design, &family.words()), words))
+                let lost = self.lost(&design, &family.words(), &limit)?;
+                limit.fetch_min(lost.at_worst, Ordering::Relaxed);
+                Some((lost, words))
             };
             let tried = (1..=SEEDS).into_par_iter().filter_map(of);
             let of_length = tried.min_by_key(|(lost, words)| (*lost, words.seed));
@@ -105,12 +110,13 @@ impl Requirements {
         Ok(Candidate { words: Some(words), ..candidate.clone() })
     }
 
-    /// How many shots of `design`, if it sent these `words` in turn, are lost to own light.
-    fn lost(&self, design: &Design, words: &[CodeWord]) -> Lost {
+    /// Shots of `design` that are lost to own light, if it sent these `words` in turn; `None` if more than `limit`
+    /// are lost at some range. The limit falls while other words are tried: words above it are not the best.
+    fn lost(&self, design: &Design, words: &[CodeWord], limit: &AtomicUsize) -> Option<Lost> {
         let sampling = design.receiver.method.sampling();
         let none = Lost { at_worst: 0, in_all: 0 };
-        let Some(sampling) = sampling else { return none };
-        let Some(blind) = Blind::at_most(sampling) else { return none };
+        let Some(sampling) = sampling else { return Some(none) };
+        let Some(blind) = Blind::at_most(sampling) else { return Some(none) };
         let last = tof_from_range(self.wanted.range_m);
         let own = OwnLight::of_words(design, words, blind.between_ticks(), last);
         let least = usize::from(sampling.least_marks);
@@ -118,9 +124,12 @@ impl Requirements {
         for (_, told) in own.each_told(design.scan.min_range, self.wanted.range_m) {
             let here = told.iter().filter(|told| **told < least).count();
             lost.at_worst = lost.at_worst.max(here);
+            if lost.at_worst > limit.load(Ordering::Relaxed) {
+                return None;
+            }
             lost.in_all += here;
         }
-        lost
+        Some(lost)
     }
 
     /// How long the words of `candidate` last, s; nothing of one that waits.
@@ -173,7 +182,8 @@ mod tests {
             let best = required.with_best_words(&short).unwrap();
             let lost = |it: &Candidate| {
                 let words = Family::separated(it.words.unwrap()).unwrap().words();
-                required.lost(&it.unlimited(&required).unwrap(), &words).at_worst
+                let limit = AtomicUsize::new(usize::MAX);
+                required.lost(&it.unlimited(&required).unwrap(), &words, &limit).unwrap().at_worst
             };
             assert_eq!(best.words.unwrap().gap, 22);
             let most = LONGEST * required.shortest_period(beams, facets);
