@@ -1,4 +1,4 @@
-//! What tests need of other people's programs: Python with packages, and a browser.
+//! Means of tests: Python with packages, a browser, lists of sources.
 //!
 //! Files that Macropulse writes are read in its tests by readers that others wrote, most of them
 //! Python packages. [`python`] makes an environment with the packages of a requirements file, once,
@@ -104,6 +104,22 @@ pub fn target() -> Result<PathBuf, String> {
     target
         .map(Path::to_path_buf)
         .ok_or_else(|| format!("{} does not lie where cargo puts test programs", program.display()))
+}
+
+/// The Rust sources in `folder` and below; none of a folder that cannot be read.
+pub fn sources_below(folder: &Path) -> Vec<PathBuf> {
+    let (mut folders, mut files) = (vec![folder.to_owned()], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                files.push(path);
+            }
+        }
+    }
+    files
 }
 
 #[cfg(test)]

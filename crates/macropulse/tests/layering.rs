@@ -8,6 +8,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use macropulse_testbed::sources_below;
+
 /// A module, the modules of its crate it may name, and why no others.
 struct Rule {
     module: &'static str,
@@ -284,28 +286,12 @@ impl Layers {
     }
 }
 
-/// Every Rust source in `folder` and below.
-pub(crate) fn sources_below(folder: PathBuf) -> Vec<PathBuf> {
-    let (mut folders, mut files) = (vec![folder], Vec::new());
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).into_iter().flatten() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|ending| ending == "rs") {
-                files.push(path);
-            }
-        }
-    }
-    files
-}
-
 /// Path and text of every source file of `module`.
 fn sources(layers: &Layers, module: &str) -> Vec<(String, String)> {
     let root = layers.root().join("src");
     let alone = root.join(format!("{module}.rs"));
     let alone = alone.is_file().then_some(alone);
-    let files = alone.into_iter().chain(sources_below(root.join(module)));
+    let files = alone.into_iter().chain(sources_below(&root.join(module)));
     let found: Vec<(String, String)> = files
         .map(|path| {
             let name = path.strip_prefix(&root).unwrap().display().to_string();
@@ -452,7 +438,7 @@ fn the_speed_of_light_is_named_by_few() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let folders =
         ["macropulse", "macropulse-codec", "macropulse-study", "macropulse-cli", "macropulse-py"];
-    let all = folders.iter().flat_map(|folder| sources_below(crates.join(folder).join("src")));
+    let all = folders.iter().flat_map(|folder| sources_below(&crates.join(folder).join("src")));
     let names_it = |path: &PathBuf| {
         words(&bare(&fs::read_to_string(path).unwrap())).any(|word| word == "SPEED_OF_LIGHT")
     };

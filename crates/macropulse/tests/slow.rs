@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::layering::sources_below;
+use macropulse_testbed::sources_below;
 
 const SLOW: &str = "#[ignore = \"slow: before a release\"]";
 
@@ -22,7 +22,7 @@ fn function(line: &str) -> Option<&str> {
 /// Names of tests, and whether each is slow. Pages of the guide are tests that a macro makes.
 fn tests() -> BTreeMap<String, bool> {
     let mut tests = BTreeMap::new();
-    for file in sources_below(root().join("crates")) {
+    for file in sources_below(&root().join("crates")) {
         let text = fs::read_to_string(file).unwrap();
         let mut is_slow = None;
         for line in text.lines() {

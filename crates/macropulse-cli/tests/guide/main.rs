@@ -116,6 +116,20 @@ fn pages_are_in_plain_english() {
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
+#[test]
+fn comments_are_in_plain_english() {
+    let sources = macropulse_testbed::sources_below(&root().join("crates"));
+    assert!(sources.len() > 500, "{}", sources.len());
+    let mut faults = Vec::new();
+    for source in sources {
+        let name = source.strip_prefix(root()).unwrap().display().to_string();
+        for comment in prose::comments(&fs::read_to_string(&source).unwrap()) {
+            faults.extend(prose::faults(&comment).iter().map(|fault| format!("{name}: {fault}")));
+        }
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
 /// The table of constants on the page about decoding has the values of the code.
 #[test]
 fn constants_of_the_receiver_are_those_of_the_code() {

@@ -1,4 +1,4 @@
-//! Plain English: sentences that a page must not have.
+//! Plain English: sentences that pages and comments must not have.
 
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 
@@ -31,6 +31,29 @@ pub fn faults(text: &str) -> Vec<String> {
         }
     }
     faults
+}
+
+/// The comments of a Rust source, without their markers. Lines with the same marker are one comment.
+pub fn comments(source: &str) -> Vec<String> {
+    let mut comments: Vec<String> = Vec::new();
+    let mut last = "";
+    for line in source.lines() {
+        let line = line.trim();
+        let mut markers = ["///", "//!", "//"].into_iter();
+        let marker = markers.find(|marker| line.starts_with(marker)).unwrap_or_default();
+        if !marker.is_empty() && marker != last {
+            comments.push(String::new());
+        }
+        if !marker.is_empty()
+            && let Some(text) = comments.last_mut()
+        {
+            let rest = &line[marker.len()..];
+            text.push_str(rest.strip_prefix(' ').unwrap_or(rest));
+            text.push('\n');
+        }
+        last = marker;
+    }
+    comments
 }
 
 /// The paragraphs, headings and items of a page. Code within a line is one word; blocks and tables are left out.
@@ -84,4 +107,12 @@ fn what_is_hard_to_read_is_found() {
     for (fault, begin) in found.iter().zip(begins) {
         assert!(fault.starts_with(begin), "{fault}");
     }
+}
+
+#[test]
+fn comments_are_taken_from_sources() {
+    let source = "//! One.\n//! Two.\n\n/// Of three.\nfn f() {\n    // Four,\n    // five.\n    g(); // no\n}\n";
+    let found = comments(source);
+    assert_eq!(found, ["One.\nTwo.\n", "Of three.\n", "Four,\nfive.\n"]);
+    assert_eq!(faults(&found[1]), ["begins with Of: Of three."]);
 }
