@@ -1,8 +1,8 @@
 //! Pulse trains of interferers at the aperture (docs/physics.md#other-lidars).
 //!
-//! 1. The receiver listens from the firing of each shot to the end of its range gate. In that time
-//!    light arrives that interferers have fired as long before as light is followed, there and
-//!    back. A detector of its own pixel listens to its own shot alone.
+//! 1. The receiver listens from the firing of each shot to the end of its range gate. In that time light
+//!    arrives from shots that interferers fired earlier, by at most the time in which light is followed,
+//!    there and back. A detector of its own pixel listens to its own shot alone.
 //! 2. By reflection: from each point that a ray of an interferer meets and a listening detector
 //!    looks at ([`Illuminated`]), with the photons
 //!
@@ -14,9 +14,9 @@
 //!
 //!    n = K · exp(−r²/s²) · exp(−σ·D) / s², s² = a² + b²/2
 //!
-//!    b = d/2 + D·θ/2 for a beam of diameter d and divergence θ that begins D metres away. The edge of the
-//!    aperture is taken to be Gaussian, so that the formula holds for a beam that is narrower than
-//!    the aperture as for one that is wider. a is that of the sensor's link budget ([`aperture_radius`]).
+//!    b = d/2 + D·θ/2 for a beam of diameter d and divergence θ that begins D metres away. The radius a is
+//!    that of the sensor's link budget, if it has one ([`aperture_radius`]). The edge of the aperture is
+//!    taken to be Gaussian, so the formula holds for beams both narrower and wider than the aperture.
 //!
 //! All of it is where it is when the shot is fired.
 
@@ -35,10 +35,10 @@ pub const APERTURE_RADIUS: f64 = 12.5e-3;
 /// Light that brings fewer photons per mark is left out.
 const FAINTEST: f64 = 1e-6;
 
-/// Beams that pass the aperture by more than so many times s are left out.
+/// Beams whose axis passes the aperture at more than this multiple of s are left out.
 const FARTHEST_BY: f64 = 4.0;
 
-/// A micropulse ends so many times its length before and after its middle.
+/// A micropulse ends this multiple of its length before and after its middle.
 const FLANKS: f64 = 4.0;
 
 /// Number of the direct way; those before it are the rays of a footprint.
@@ -110,8 +110,8 @@ fn pulses_of(other: &Mount<'_>) -> (u64, f64) {
     })
 }
 
-/// When first chips may arrive that the receiver of `log` can see light of, fs, if there is light
-/// so long `before` and `after` them. Ascending, and apart.
+/// Returns the spans of time, fs, in which a first chip may arrive for the receiver of `log` to see some of
+/// its light. The light extends `before` that chip and `after` it. The spans ascend and do not touch.
 fn listening(design: &Design, log: &ShotLog, (before, after): (i64, i64)) -> Vec<Range<i64>> {
     let jitter_fs = design.most_jitter_fs();
     let listening_fs = design.listening_fs();
@@ -126,9 +126,9 @@ fn listening(design: &Design, log: &ShotLog, (before, after): (i64, i64)) -> Vec
     open
 }
 
-/// Whether the detector of a pixel listens when light arrives that begins so long `before` and
-/// ends so long `after` that. One that all pixels share does, unless its field follows the beam and
-/// has not come to the pixel or has left it.
+/// Returns true if the detector of a pixel listens to light that arrives at `arrives_fs`, and begins `before`
+/// and ends `after` that time, fs. A detector whose field follows the beam listens while the field is on the
+/// pixel. One that all pixels share, with a fixed field, always listens.
 fn listens(
     design: &Design,
     log: &ShotLog,
@@ -163,9 +163,9 @@ struct Direct<'a> {
     pair: Pair<'a>,
     aperture: f64,
     farthest: f64,
-    /// Where both are.
+    /// Poses of both lidars.
     ends: Ends,
-    /// Where the beam begins, in the frame of the other, m.
+    /// Start of the beam, in the frame of the other, m.
     begin: [f64; 3],
     /// The way from there; `None` if it is too long.
     sight: Option<Sight>,
@@ -287,7 +287,7 @@ impl Arrivals<'_> {
         }
     }
 
-    /// Adds what arrives of a shot after a way of so many metres.
+    /// Adds the light of a shot that arrives after a way of `way` metres.
     fn add(
         &mut self,
         (log, shot): (&ShotLog, usize),
