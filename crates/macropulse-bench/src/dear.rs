@@ -1,4 +1,4 @@
-//! Where the time of a scan as declared goes: which bands are dear to decode, and what is found in them.
+//! Decoding time of a scan as declared: which bands are the most expensive, and what is found in them.
 
 use std::slice;
 
@@ -8,7 +8,8 @@ use crate::Fallible;
 use crate::page::{self, three};
 use crate::sample::{Condition, Given, Sample};
 
-/// One band in so many is decoded: so close that far ground, which is a few rows, is met in each scene.
+/// Interval of the decoded bands. It is short enough for each scene to show far ground, which is only a few
+/// rows.
 const EVERY: usize = 3;
 
 /// How often each is timed.
@@ -101,7 +102,7 @@ fn timed(sample: &Sample, given: &Given) -> Result<Decoded, decode::Error> {
     })
 }
 
-/// What is in each of the [`SHARES`] of sorted `bands`.
+/// Returns the sum of each of the [`SHARES`] of sorted `bands`.
 fn parts(bands: &[Decoded]) -> [Decoded; SHARES.len()] {
     let mut first = 0;
     SHARES.map(|(_, share)| {

@@ -7,11 +7,11 @@ use crate::machine::least_seconds;
 use crate::page::{self, grouped, three};
 use crate::sample::{Condition, SCENES, Sample, Score};
 
-/// One band in this many is measured of a scene with surfaces; where every shot has a range of its
-/// own, one in so many.
+/// Intervals of the measured bands: in a scene with surfaces, and in one where every shot has a range of its
+/// own.
 const EVERY: [usize; 2] = [5, 12];
 
-/// What was measured of one scene and detector.
+/// Measurements of one scene and detector.
 #[derive(Debug, Clone, Copy)]
 pub struct Decoded {
     /// How fast.
@@ -20,7 +20,7 @@ pub struct Decoded {
     pub score: Score,
 }
 
-/// What was measured, in the order of [`Condition::all`], of each of [`SCENES`].
+/// Measurements of each of [`SCENES`], in the order of [`Condition::all`].
 pub struct Decoding(Vec<Vec<Decoded>>);
 
 /// Measures it.
@@ -45,7 +45,7 @@ pub fn whole(scene: &str, condition: Condition) -> Fallible<Score> {
 }
 
 impl Decoding {
-    /// What was measured in one of the [`SCENES`].
+    /// Returns the measurements of one of the [`SCENES`].
     pub fn of(&self, scene: &str, condition: Condition) -> Option<Decoded> {
         let scene = SCENES.iter().position(|other| *other == scene)?;
         self.0[scene].get(Condition::all().position(|other| other == condition)?).copied()

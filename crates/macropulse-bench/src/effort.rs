@@ -1,4 +1,4 @@
-//! What a quick receiver finds otherwise than a thorough one.
+//! Differences between the returns of a quick receiver and a thorough one.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,14 +8,14 @@ use crate::Fallible;
 use crate::page::{self, grouped, three};
 use crate::sample::{Condition, SCENES, Sample};
 
-/// One band in so many is decoded, as a thorough receiver takes minutes for a scan in dense noise.
+/// Interval of the decoded bands, as a thorough receiver takes minutes for a scan in dense noise.
 const SOME: usize = 24;
 
-/// All bands: light that is as faint as sensors declare it is in a few of them only, which a sample may leave out.
+/// All bands. Echoes as faint as sensors declare them are in a few bands only, which a sample may leave out.
 const ALL: usize = 1;
 
-/// So many scans are decoded: what is found otherwise comes in runs of shots, so that one scan of `street` as declared
-/// has from 23 to 44 of them with five seeds.
+/// Number of scans. Shots that are found otherwise come in runs: one scan of `street` as declared has from 23
+/// to 44 of them, with five seeds.
 const SCANS: u64 = 4;
 
 /// The detectors, and their names: without noise, in some, in faint light, and in dense noise; and which bands
@@ -29,14 +29,14 @@ const DETECTORS: [(&str, Condition, usize); 6] = [
     ("as declared", Condition::Declared, ALL),
 ];
 
-/// What was measured.
+/// Measurements of all scenes and detectors.
 pub struct Efforts(Vec<Row>);
 
 struct Row {
     scene: &'static str,
     detector: &'static str,
     shots: f64,
-    /// Shots of which they do not give the same ranges.
+    /// Shots with different ranges.
     differ: usize,
     /// Seconds that the thorough one takes, and the quick one.
     took: [f64; 2],
@@ -79,7 +79,7 @@ pub fn measure() -> Fallible<Efforts> {
     Ok(Efforts(rows))
 }
 
-/// Whether neighbouring shots of a scene see the same surfaces.
+/// Returns true if neighbouring shots of a scene see the same surfaces.
 fn has_surfaces(scene: &str) -> bool {
     scene != "random"
 }

@@ -1,13 +1,16 @@
-//! What decoding costs at least: an experiment beside the receiver that is told where all light comes from.
+//! Least cost of decoding: an experiment beside the receiver that is told where all light comes from.
 //!
-//! In noise every tick is laid down as a bit, twice, as what is explained must be told from what was seen; of
-//! each echo the marks are counted at 256 lags about its range, which is taken from the scene, and put
-//! out. Without noise every tick is held against the one before it and against the one that is
-//! expected. Nothing is searched for, doubted or written down. A second floor measures besides what a return
-//! must have measured of it: in each lit bit the marks that were seen and in each dark one those that are left
-//! over, which tell its label, and with jitter the ticks of each lateness, which tell its time.
-//! Ticks are laid down and marks are counted by the loops of the receiver, so that it takes as much longer as it
-//! does besides.
+//! In noise every tick is laid down as a bit, twice, to keep what is explained apart from what was seen. The
+//! marks of each echo are counted at 256 lags about its range, and put out. The range is taken from the
+//! scene. Without noise every tick is compared with the one before it and with the expected one. Nothing is
+//! searched for, doubted or written down.
+//!
+//! A second floor adds the measurements that a return must have. The marks that were seen in each lit bit,
+//! and those that are left over in each dark one, tell its label. With jitter the ticks of each lateness tell
+//! its time.
+//!
+//! The loops of the receiver lay down the ticks and count the marks. The receiver takes longer by the time of
+//! all its other work.
 
 use std::hint::black_box;
 
@@ -93,8 +96,8 @@ on_every_level! {
     }
 }
 
-/// What tells a label: the marks of each word, and the ticks from the beginning of a macropulse to each bit that
-/// is dark, and to each that is lit, by label.
+/// Tables to tell a label: the marks of each word, and the ticks from the beginning of a macropulse to each
+/// dark bit and to each lit one, by label.
 struct Labels {
     words: Vec<WordMarks>,
     bits: Vec<[Vec<u32>; 2]>,
@@ -120,8 +123,8 @@ impl Labels {
     }
 }
 
-/// Seconds to lay all ticks down, and to count and put out the marks of all echoes; and if they are `told` by their
-/// `labels` also to count them bit by bit, and with jitter by their lateness.
+/// Returns the seconds to lay all ticks down, and to count and put out the marks of all echoes. If they are
+/// `told` by their `labels`, marks are also counted bit by bit, and with jitter by their lateness.
 fn laid_and_counted(sample: &Sample, given: &[Given], labels: &Labels, told: bool) -> f64 {
     let echoes = sample.echoes();
     let width = sample.design.receiver.window_ticks();
@@ -147,7 +150,7 @@ fn laid_and_counted(sample: &Sample, given: &[Given], labels: &Labels, told: boo
                 };
                 let here = echoes.partition_point(|echo| echo.start < begin + STRETCH);
                 for Echo { start, marks, word, label } in &echoes[..here] {
-                    // Where the first lag would come before the stretch, it is the first one that does not.
+                    // The first lag must not come before the stretch.
                     let first = start.saturating_sub(begin + BEFORE);
                     let word = &labels.words[usize::from(*word)];
                     let [dark, bright] = &labels.bits[usize::from(*label)];

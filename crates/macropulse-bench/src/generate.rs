@@ -1,5 +1,5 @@
-//! From shots to ticks: shot log, echoes, detection events, ticks. What the scene makes of the shots
-//! is traced beforehand.
+//! From shots to ticks: shot log, echoes, detection events, ticks. The hits of the shots in the scene are
+//! traced beforehand.
 
 use crate::Fallible;
 use crate::machine::least_seconds;

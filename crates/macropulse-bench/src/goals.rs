@@ -1,4 +1,4 @@
-//! What was measured beside what is wanted.
+//! Measurements beside the goals.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::rays::{LEAKED_OF, Rays};
 use crate::sample::Condition;
 use crate::scans::WholeScans;
 
-/// What is judged.
+/// Measurements to be judged.
 pub struct Measured<'a> {
     /// Rays per second.
     pub rays: &'a Rays,
@@ -28,7 +28,7 @@ pub struct Measured<'a> {
     pub scans: &'a WholeScans,
 }
 
-/// A row: what, what is wanted of it, and what was measured and whether that will do.
+/// A row: a quantity, its goal, its measurement, and whether that meets the goal.
 struct Goal {
     what: String,
     wanted: String,
@@ -94,7 +94,7 @@ pub fn text(measured: &Measured) -> Fallible<String> {
     Ok(page::table(&["what", "goal", "measured", "met"], &rows))
 }
 
-/// What is wanted of decoding.
+/// A goal of decoding.
 pub struct Decode {
     /// The condition, in words.
     pub name: &'static str,
@@ -104,7 +104,7 @@ pub struct Decode {
     pub least: f64,
 }
 
-/// All that is wanted of decoding.
+/// All goals of decoding.
 pub fn decoding() -> impl Iterator<Item = Decode> {
     let noise = |missed, counts| Condition::Noise { missed, counts };
     let wanted = [
@@ -196,7 +196,7 @@ fn sizes() -> Fallible<Vec<Goal>> {
     ])
 }
 
-/// Where the receivers are.
+/// Sources of the crate with the receivers.
 const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../macropulse-codec/src");
 
 /// Lines of all sources in `folder`, without tests.

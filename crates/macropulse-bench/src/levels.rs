@@ -11,11 +11,11 @@ use crate::machine::printed;
 use crate::page;
 use crate::sample::Sample;
 
-/// One band in so many is decoded.
+/// Interval of the decoded bands.
 const EVERY: usize = 12;
 
-/// What a process that uses the instructions of one level prints: how fast it decodes what there are goals
-/// of, one to a line.
+/// Returns the output of a process that uses the instructions of one level: the decoding speed of each goal,
+/// one to a line.
 pub fn speeds() -> Fallible<String> {
     let speed = |goal: goals::Decode| -> Fallible<String> {
         let sample = Sample::of(goal.condition.design()?, goal.scene, EVERY)?;

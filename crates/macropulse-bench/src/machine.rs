@@ -6,7 +6,7 @@ use std::process::Command;
 use macropulse::codec::level::Level;
 use macropulse::processor::thread_seconds;
 
-/// What the figures depend on.
+/// Describes the program and the machine, on which the figures depend.
 pub fn words() -> String {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let processors = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
@@ -28,8 +28,8 @@ pub fn words() -> String {
     )
 }
 
-/// Seconds of this thread for `run`: the least of the rounds that add up to a second. What
-/// takes longer is run once.
+/// Returns the seconds of this thread for `run`: the least of the rounds that add up to a second. A `run`
+/// that takes longer is timed once.
 pub fn least_seconds(mut run: impl FnMut()) -> f64 {
     least_of_rounds(|| seconds(&mut run))
 }
@@ -51,7 +51,7 @@ pub fn seconds(run: impl FnOnce()) -> f64 {
     thread_seconds() - began
 }
 
-/// What a command prints, or why it failed.
+/// Returns the output of a command, or why it failed.
 pub fn printed(command: &mut Command) -> Result<String, String> {
     let output = command.output().map_err(|why| why.to_string())?;
     match output.status.success() {

@@ -24,7 +24,7 @@ mod rays;
 mod sample;
 mod scans;
 
-/// What may fail for a reason worth a sentence.
+/// Result of an action that may fail for a reason worth a sentence.
 type Fallible<T> = Result<T, Box<dyn Error>>;
 
 /// The sections that are written, in the order in which they are measured.
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
 
 fn run(words: &[&str]) -> Fallible<()> {
     match words {
-        // What this program has processes of its own do: their memory is measured, or they use fewer instructions.
+        // This program starts processes of its own, to measure their memory or to use fewer instructions.
         ["load", folder] => println!("{}", rays::load(Path::new(folder))?),
         ["speeds"] => print!("{}", levels::speeds()?),
         ["sixty"] => {

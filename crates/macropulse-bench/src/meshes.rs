@@ -21,7 +21,7 @@ pub type Corners = [[f32; 3]; 3];
 /// A unit vector.
 pub type Direction = [f32; 3];
 
-/// Where the rays start, m.
+/// Origin of the rays, m.
 pub const EYE: [f32; 3] = [0.0, 0.0, 1.5];
 
 /// Triangles of a surface of `rows` by `columns` cells with corners at `point(row, column)`.
@@ -137,8 +137,8 @@ pub fn shuffled() -> Vec<Direction> {
     all
 }
 
-/// Those of a scan of `hdl-64e`, whose 64 lasers fire in turn while the head turns: in the order of its shots, of which
-/// each is of another laser than the one before; and laser by laser.
+/// Returns the directions of a scan of `hdl-64e`, in the order of its shots and laser by laser. Its 64 lasers
+/// fire in turn while the head turns, so that each shot is of another laser than the one before.
 pub fn of_a_turning_head() -> Fallible<[Vec<Direction>; 2]> {
     let design = Design::open("hdl-64e", &[])?;
     let directions = design.directions();

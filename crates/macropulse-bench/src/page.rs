@@ -4,15 +4,15 @@ use std::error::Error;
 use std::fs;
 use std::path::PathBuf;
 
-/// What ends a section.
+/// Line that ends a section.
 const END: &str = "<!-- end of what is written by a command -->";
 
-/// What begins the section `name`.
+/// Returns the line that begins the section `name`.
 fn begin(name: &str) -> String {
     format!("<!-- {name}: written by `cargo run --release -p macropulse-bench`, not by hand -->")
 }
 
-/// Where the page is.
+/// Returns the path of the page.
 pub fn path() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/performance.md"))
 }

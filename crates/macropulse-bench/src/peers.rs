@@ -13,23 +13,23 @@ use crate::meshes::{Direction, EYE};
 /// How often a mesh is loaded: the least time counts.
 pub const LOADS: usize = 3;
 
-/// What a program prints of one mesh.
+/// Figures that a program prints for one mesh.
 #[derive(Debug, Default)]
 pub struct Figures {
     /// Processor time to load the mesh, s.
     pub load_s: f64,
     /// Most memory of the program until then, bytes.
     pub peak: f64,
-    /// Of each list of rays, millions per second in each way.
+    /// Millions of rays per second, by list of rays and by way.
     pub rates: Vec<Vec<f64>>,
-    /// Of each list, the rays that hit.
+    /// Rays that hit, by list of rays.
     pub hits: Vec<usize>,
 }
 
 /// A library, and the program that measures it.
 pub struct Peer {
     program: OsString,
-    /// What the program is given before the mesh.
+    /// Argument before the mesh: the library of Embree, or the script for Open3D.
     before: PathBuf,
     /// The ways in which it casts rays, by the names that it prints.
     ways: &'static [&'static str],
@@ -67,7 +67,7 @@ impl Peer {
         }
     }
 
-    /// Whether the program loads a mesh without triangles.
+    /// Returns true if the program loads a mesh without triangles.
     fn works(&self, folder: &Path) -> bool {
         let mesh = folder.join("none.stl");
         fs::write(&mesh, [0; 84]).is_ok() && printed(&mut self.command(&mesh)).is_ok()
@@ -129,8 +129,8 @@ pub fn write(rays: &[&[Direction]], folder: &Path) -> Fallible<Vec<PathBuf>> {
     rays.iter().enumerate().map(write).collect()
 }
 
-/// Where Embree may be: as the variable `EMBREE` says, in the Python package `embreex`, or where
-/// the system looks for libraries.
+/// Returns the places where Embree may be: the one in the variable `EMBREE`, the Python package `embreex`,
+/// and those where the system looks for libraries.
 fn libraries() -> Vec<String> {
     let find = "import importlib.util, pathlib\n\
         home = pathlib.Path(importlib.util.find_spec('embreex').origin).parent.parent\n\

@@ -122,7 +122,7 @@ impl Directions {
     }
 }
 
-/// What is measured, by name.
+/// A way to cast rays: its name, and the function that counts the hits.
 type Way = (&'static str, fn(&Libraries, &Directions) -> usize);
 
 const WAYS: [Way; 3] = [
@@ -131,8 +131,9 @@ const WAYS: [Way; 3] = [
     ("obvhs", Libraries::obvhs),
 ];
 
-/// Millions of rays per second: the best of several rounds of each way, one after another as in the program for
-/// Embree. As many rays hit by all of them, and by the others that found `hits`, but for a few that touch an edge.
+/// Returns millions of rays per second: the best of several rounds of each way, one after another as in the
+/// program for Embree. All ways, and the other libraries that found `hits`, must hit the same number of rays,
+/// but for a few that touch an edge.
 fn rates(
     libraries: &Libraries,
     rays: &Directions,
@@ -200,7 +201,7 @@ fn load_apart(folder: &Path) -> Fallible<(f64, f64)> {
     Ok(least)
 }
 
-/// What that process does and prints.
+/// Loads the scene in `folder`, and returns the line that the process prints.
 pub fn load(folder: &Path) -> Fallible<String> {
     let began = thread_seconds();
     let scene = meshes::open(folder)?;
@@ -217,7 +218,7 @@ pub fn peak() -> f64 {
     1024.0 * kibibytes.unwrap_or_default()
 }
 
-/// Rays that leave a sphere of which some triangles are `missing`.
+/// Counts the rays that leave a sphere from which `missing` triangles were taken.
 fn leaks(folder: &Path, missing: usize) -> Fallible<usize> {
     let mut triangles = meshes::sphere();
     // From the middle: those at the end are slivers about the pole.

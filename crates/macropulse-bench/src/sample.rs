@@ -224,8 +224,8 @@ impl Sample {
         Ok((returns, thread_seconds() - began))
     }
 
-    /// The least seconds for that where each band is decoded as soon as its ticks are there, as in a whole scan: of
-    /// ticks made long ago a clean one takes longer, as they have to be fetched from memory.
+    /// Returns the least seconds to decode each band as soon as its ticks are there, as in a whole scan. If
+    /// the ticks were made long ago, a clean band takes longer, as they have to be fetched from memory.
     pub fn decoding_seconds(&self) -> f64 {
         let detectors = self.detectors();
         least_of_rounds(|| {

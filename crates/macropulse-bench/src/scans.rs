@@ -13,7 +13,7 @@ use crate::sample::{Condition, SEED};
 /// Scans are made for so long, s, and two at least.
 const ENOUGH: f64 = 4.0;
 
-/// What is scanned whole.
+/// Scenes that are scanned whole, and their detectors.
 const WHOLE: [(&str, Condition); 4] = [
     ("car-50m", Condition::CLEAN),
     ("car-50m", Condition::Declared),
@@ -47,7 +47,7 @@ pub fn measure() -> Fallible<WholeScans> {
     Ok(WholeScans(all))
 }
 
-/// Scans per second on so many threads, and seconds of a scan in each stage.
+/// Returns the scans per second on `threads` threads, and the seconds of a scan in each stage.
 fn run(
     scene: &str,
     condition: Condition,
@@ -72,7 +72,7 @@ fn run(
     Ok(measured?)
 }
 
-/// What a row is of.
+/// Returns the name of a row.
 fn name(scene: &str, condition: Condition) -> String {
     let condition = if condition == Condition::Declared { "declared" } else { "clean" };
     format!("`{scene}` {condition}")
@@ -102,7 +102,8 @@ impl WholeScans {
     }
 }
 
-/// The table of scans per second as threads are added, each time as many again, up to all there are.
+/// Returns the table of scans per second, with the number of threads doubled from row to row, up to all there
+/// are.
 pub fn on_threads() -> Fallible<String> {
     const ROUNDS: usize = 2;
     let all = std::thread::available_parallelism()?.get();
@@ -128,7 +129,7 @@ pub fn on_threads() -> Fallible<String> {
     Ok(format!("Scans per second of wall time.\n\n{}", page::table(&head, &rows)))
 }
 
-/// Sixty clean scans of the car: for a process of which the memory is looked at afterwards.
+/// Makes sixty clean scans of the car, for a process whose memory is looked at afterwards.
 pub fn sixty() -> Fallible<()> {
     let (design, scene) = (Condition::CLEAN.design()?, Scene::open("car-50m")?);
     let mut scans = Scans::new(&design, &scene, SEED)?;

@@ -35,7 +35,7 @@ pub struct Codes {
     json: bool,
 }
 
-/// What is compared if nothing is named: words of about the length of the paper's, and dense ones.
+/// Families compared if none is named: words of about the length of the paper's, and dense ones.
 const DEFAULTS: [&str; 8] = [
     "prime=29",
     "extended-prime=29",

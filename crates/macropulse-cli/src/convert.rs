@@ -47,7 +47,7 @@ pub struct Convert {
     #[command(flatten)]
     memory: MemoryLimit,
 
-    /// Of MCAP files, read the clouds of this topic alone [default: those of all topics]
+    /// Read only the clouds of this topic of MCAP files [default: those of all topics]
     #[arg(long, value_name = "TOPIC")]
     topic: Option<String>,
 
@@ -56,7 +56,7 @@ pub struct Convert {
     replace: bool,
 }
 
-/// Where the clouds go.
+/// Destination of the clouds.
 struct Target {
     formats: Vec<Format>,
     folder: PathBuf,
@@ -167,7 +167,7 @@ impl Target {
         Outputs::of(is_written).beside(inputs)
     }
 
-    /// Whether it takes several scans.
+    /// Returns true if it takes several scans.
     fn takes_several(&self) -> bool {
         self.file.is_none() || self.formats.iter().all(|format| format.is_of_run())
     }

@@ -15,17 +15,16 @@ use crate::text::{print, print_json, warn};
 
 /// Find lidars that do what is required, coded and waiting, and where each of them wins
 ///
-/// Every combination of photodiode, marks and beams that is allowed is worked out in closed form: the
-/// energy that eyes allow, the best pulse, the least aperture. Of those that close, the ones with the
-/// fewest beams are simulated, on a target all around and on a field of tiles at ranges that have nothing
-/// to do with each other. What was counted stays in DIR/trials, so the same command goes on where it was
-/// stopped.
+/// Every combination of photodiode, marks and beams that is allowed is worked out in closed form: the energy
+/// that eyes allow, the best pulse, the least aperture. Among those that close, the ones with the fewest
+/// beams are simulated: on a target all around, and on a field of tiles at unrelated ranges. Counts stay in
+/// DIR/trials, so the same command goes on where it was stopped.
 #[derive(Args)]
 #[command(after_help = "Example:
   macropulse design docs/examples/requirements.toml -o lidars
 and open lidars/index.html; lidars/coded.toml is a sensor for simulate, budget and sweep")]
 pub struct Design {
-    /// TOML file of what is wanted and of which parts it may be made
+    /// TOML file of the requirements and of the parts that may be used
     #[arg(value_name = "REQUIREMENTS")]
     requirements: PathBuf,
 
@@ -48,7 +47,7 @@ pub fn run(options: &Design, common: &Common) -> Result<(), Fault> {
     let mut folder = Folder::claim_alone(&options.output, Outputs::named([] as [&str; 0]))?;
     let interrupt = Interrupt::listen()?;
     folder.make()?;
-    // What is counted stays there for the next time, however this one ends.
+    // Counts stay there for the next time, however this one ends.
     folder.keep();
     make_room(&options.output)?;
     let progress = Progress::of(common, "design", required.most_shots());

@@ -1,4 +1,4 @@
-//! What can go wrong, whose fault it is, and the exit code that says so.
+//! Faults of commands: what went wrong, whose fault it is, and the exit code that says so.
 
 use std::io;
 use std::slice;
@@ -30,7 +30,7 @@ impl Fault {
         Self::Wrong(format!("{name}: cannot be read: {}", told::unreadable(error)))
     }
 
-    /// What the `sentence` says could not be written: the name of the place was wrong, or the machine
+    /// Fault of a write that failed, as the `sentence` says: the name of the place was wrong, or the machine
     /// does not take it.
     pub fn unwritten(sentence: String, error: &io::Error) -> Self {
         match told::is_of_the_machine(error) {
@@ -39,7 +39,7 @@ impl Fault {
         }
     }
 
-    /// What could not be written to standard output.
+    /// Fault of a write to standard output that failed.
     pub fn unprinted(error: &io::Error) -> Self {
         Self::Ours(format!("cannot write to standard output: {}", told::unwritable(error)))
     }

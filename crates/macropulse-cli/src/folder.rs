@@ -1,4 +1,4 @@
-//! Where results go: a folder that is not left half filled, and what stands there already.
+//! Folders for results: they are not left half filled, and files that are already there are checked first.
 
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
@@ -19,15 +19,15 @@ const ELSEWHERE: &str = "choose another folder with -o";
 
 /// The files that a command writes into its folder, under names that it derives.
 ///
-/// Such a name replaces a file that Macropulse is known to have written, and nothing else: no input of the
-/// same run, no file of a user, no link, no device.
+/// Such a name replaces only a file that Macropulse is known to have written, or with `--replace` any other
+/// one. It never replaces an input of the same run, a link, a folder or a device.
 pub struct Outputs {
     /// True for the path, within the folder, of a file that the run writes.
     is_written: Box<dyn Fn(&Path) -> bool>,
     /// Paths of folders in the folder.
     folders: Vec<PathBuf>,
     inputs: Vec<PathBuf>,
-    /// Whether `--replace` was said; none where a command has no such option.
+    /// True if `--replace` was given; `None` if a command has no such option.
     replace: Option<bool>,
     /// How to write elsewhere.
     remedy: &'static str,
@@ -178,7 +178,7 @@ pub struct Folder {
     /// The folders that were not there before, the topmost first; it may be the last of them.
     made: Vec<PathBuf>,
     kept: bool,
-    /// Whether no other run may write into it meanwhile, and what holds that.
+    /// True if no other run may write into it meanwhile, and the lock for that.
     is_of_one: bool,
     lock: Option<File>,
 }
@@ -230,8 +230,8 @@ impl Folder {
         self.lock()
     }
 
-    /// Keeps other runs out of a folder that is for one, if it is there already. Where the system
-    /// knows no locks on folders none is kept out.
+    /// Keeps other runs out of a folder that is for one, if it is there already. If the system knows no locks
+    /// on folders, none is kept out.
     fn lock(&mut self) -> Result<(), Fault> {
         if !self.is_of_one || self.lock.is_some() {
             return Ok(());
@@ -280,7 +280,8 @@ impl Folder {
         older
     }
 
-    /// What is to be said of an older run in the folder, if there is one, by the `files` of this one.
+    /// Returns a warning of files of an older run in the folder, if there are any beside the `files` of this
+    /// one.
     pub fn warning_of_older(&self, files: &[String]) -> Option<String> {
         let older = self.older(files);
         let (folder, count) = (self.path.display(), older.len());
@@ -324,7 +325,7 @@ impl Drop for Folder {
     }
 }
 
-/// The folder that a path names, of which an empty one is where we are.
+/// Returns the folder that a path names: the current one for an empty path.
 fn or_here(path: &Path) -> &Path {
     if path.as_os_str().is_empty() { Path::new(".") } else { path }
 }

@@ -11,10 +11,10 @@ use macropulse::scene::{Room, Scene};
 
 use crate::fault::Fault;
 
-/// What standard input and output are called on the command line.
+/// Name of standard input and output on the command line.
 pub const STREAM: &str = "-";
 
-/// What it is called in messages.
+/// Name of standard input in messages.
 const ORIGIN: &str = "standard input";
 
 /// The sensor called `name`, with single values changed.
@@ -62,7 +62,7 @@ pub fn text(name: &OsStr) -> Result<(String, String), Fault> {
     }
 }
 
-/// What stands on standard input: read once, for all that ask for it.
+/// Returns the text of standard input: read once, for all that ask for it.
 fn stdin() -> Result<&'static str, Fault> {
     static TEXT: OnceLock<Result<String, String>> = OnceLock::new();
     let read = TEXT.get_or_init(|| {

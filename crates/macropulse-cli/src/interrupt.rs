@@ -10,7 +10,7 @@ use crate::text::warn;
 /// Held while files are written.
 static WRITING: Mutex<()> = Mutex::new(());
 
-/// Whether Ctrl-C was pressed.
+/// A flag that Ctrl-C raises.
 #[derive(Clone)]
 pub struct Interrupt(Arc<AtomicBool>);
 
@@ -31,7 +31,7 @@ impl Interrupt {
         Ok(seen)
     }
 
-    /// Whether Ctrl-C was pressed.
+    /// Returns true if Ctrl-C was pressed.
     pub fn is_raised(&self) -> bool {
         self.0.load(Ordering::SeqCst)
     }
@@ -79,7 +79,7 @@ mod signals {
         mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
     }
 
-    /// Whether `mask` has the bit of a signal.
+    /// Returns true if `mask` has the bit of a signal.
     fn has(mask: u64, signal: i32) -> bool {
         mask & (1 << (signal - 1)) != 0
     }

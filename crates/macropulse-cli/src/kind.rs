@@ -1,4 +1,4 @@
-//! What a file is: its content tells, not its name.
+//! Kinds of files, told by their content and not by their name.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -12,7 +12,7 @@ use toml::{Table, Value};
 use crate::fault::Fault;
 use crate::input::{self, STREAM};
 
-/// What can be checked.
+/// Kind of a file that can be checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     Sensor,
@@ -31,7 +31,7 @@ const OF_SCENES: [&str; 5] = ["object", "ground", "material", "interferers", "en
 const OF_SCENARIOS: [&str; 4] = ["scene", "scans", "seed", "formats"];
 
 impl Kind {
-    /// What the ready sensor or scene, or the file, called `name` is.
+    /// Returns the kind of the ready sensor or scene, or of the file, called `name`.
     pub fn of(name: &OsStr) -> Result<Self, Fault> {
         if name.to_str().and_then(preset_text).is_some() {
             return Ok(Self::Sensor);
@@ -65,9 +65,9 @@ impl Kind {
         let is_like =
             |keys: &[&str]| table.keys().any(|key| nearest(key, keys.iter().copied()).is_some());
         match table.get("sensor") {
-            // Of these a scenario has none; a scene says where the sensor stands.
+            // A scenario has none of these; a scene says where the sensor stands.
             _ if has(&["object", "ground", "material"]) => Some(Self::Scene),
-            // What a scenario names.
+            // A scenario names its sensor.
             Some(Value::String(_)) => Some(Self::Scenario),
             _ if table.contains_key("sensors") => Some(Self::Scenario),
             _ if has(&OF_SENSORS) => Some(Self::Sensor),

@@ -56,7 +56,7 @@ struct Options {
     command: Command,
 }
 
-/// What there is to do; one file each.
+/// The commands, one file each.
 #[derive(Subcommand)]
 enum Command {
     Simulate(simulate::Simulate),
@@ -81,7 +81,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    // What a library panics with where a file is damaged is told as an error of that file.
+    // A panic of a library at a damaged file is reported as an error of that file.
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |told| {
         if !macropulse::formats::is_contained() {

@@ -25,7 +25,7 @@ pub struct MemoryLimit {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Size {
     Bytes(u64),
-    /// Of what the machine has.
+    /// A share of the machine's memory.
     Share(f64),
 }
 
@@ -76,7 +76,7 @@ impl MemoryLimit {
         )))
     }
 
-    /// The limit where the machine has so much memory, if that is known, and whose it is.
+    /// Returns the limit, and whose it is, for a `machine` with this memory, if that is known.
     fn bytes(&self, machine: Option<u64>) -> Option<(u64, String)> {
         let of_machine = |share: f64| {
             let bytes = (machine? as f64 * share) as u64;

@@ -1,4 +1,4 @@
-//! What every command understands.
+//! Options that commands share.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -63,8 +63,7 @@ impl Common {
         }
     }
 
-    /// Lets rayon use as many threads as asked for, with `--threads` or, if that is 0, by its own
-    /// RAYON_NUM_THREADS.
+    /// Sets the number of threads of rayon to `--threads` or, if that is 0, to its own RAYON_NUM_THREADS.
     pub fn use_threads(&self) -> Result<(), Fault> {
         let asked = (self.threads == 0).then(|| std::env::var(RAYON_THREADS).ok()).flatten();
         if let Some(asked) =
@@ -95,7 +94,7 @@ where
     }
 }
 
-/// What is changed of sensors, scenes and their environments.
+/// Changes of sensors, scenes and their environments.
 #[derive(Args)]
 pub struct Changes {
     /// Change one value of the sensor, as scan.max_range_m=90, of the environment, as
@@ -154,7 +153,7 @@ impl Changes {
     }
 }
 
-/// What the files of a scene may name.
+/// Files that a scene may name.
 #[derive(Args)]
 pub struct Outside {
     /// Let meshes name files outside the folder of their scene, as materials and buffers: short for

@@ -52,7 +52,7 @@ impl Progress {
         }
     }
 
-    /// So many more shots are done.
+    /// Counts `shots` more as done.
     pub fn add(&self, shots: u64) {
         let done = self.done.fetch_add(shots, Ordering::Relaxed) + shots;
         match &self.face {
@@ -71,7 +71,7 @@ impl Progress {
         }
     }
 
-    /// Whether a line is due; of several threads that ask, one is told so.
+    /// Returns true if a line is due, but only to one of several threads that ask.
     fn is_due(&self) -> bool {
         let now = self.began.elapsed().as_millis() as u64;
         let due = self.due.load(Ordering::Relaxed);

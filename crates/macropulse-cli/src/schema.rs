@@ -26,7 +26,7 @@ pub struct Schema {
     output: Option<PathBuf>,
 }
 
-/// What people type.
+/// Kind of a schema, as people type it.
 #[derive(Clone, Copy, ValueEnum)]
 enum Kind {
     /// A sensor
@@ -35,7 +35,7 @@ enum Kind {
     Scene,
     /// Sun and air, a table of a scene
     Environment,
-    /// What is wanted of a lidar, for `design`
+    /// Requirements of a lidar, for `design`
     Requirements,
 }
 

@@ -36,19 +36,19 @@ const SEED: u64 = 1;
 
 /// How thoroughly to measure.
 struct Effort {
-    /// Of a clean scan one band in this many is measured.
+    /// Interval of the bands that are measured in a clean scan.
     clean: usize,
-    /// Of a noisy one.
+    /// The same in a noisy scan.
     noisy: usize,
-    /// Each measurement is repeated for so long.
+    /// Least time for which each measurement is repeated.
     time: Duration,
-    /// And over so many rounds at least.
+    /// Least number of its rounds.
     rounds: u64,
 }
 
 const USUAL: Effort = Effort { clean: 1, noisy: 10, time: Duration::from_millis(4_500), rounds: 2 };
 
-/// What was measured.
+/// Measured speeds.
 struct Figures {
     rays_per_s: f64,
     generate: f64,

@@ -1,5 +1,5 @@
-//! What is printed: to stdout, with counts and durations one can read, and to stderr. Nothing else in the
-//! program writes to either.
+//! Output: to stdout, with counts and durations one can read, and to stderr. Nothing else in the program
+//! writes to either.
 
 use std::io::{ErrorKind, Write, stderr};
 

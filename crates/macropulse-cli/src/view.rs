@@ -20,8 +20,8 @@ use crate::text::print;
 
 /// Make a page to explore a point cloud: one HTML file that any browser opens, offline
 ///
-/// The page shows the points in 3-D, coloured by range, intensity, outcome, ring or return number,
-/// and the range image beside them; a click tells all that is known of a point.
+/// The page shows the points in 3-D, and the range image beside them. Points are coloured by range,
+/// intensity, outcome, ring or return number; a click tells all that is known of a point.
 #[derive(Args)]
 #[command(after_help = "Examples:
   macropulse view out/street
@@ -38,7 +38,7 @@ pub struct View {
     #[command(flatten)]
     memory: MemoryLimit,
 
-    /// Of an MCAP file, show the clouds of this topic alone [default: those of all topics]
+    /// Show only the clouds of this topic of an MCAP file [default: those of all topics]
     #[arg(long, value_name = "TOPIC")]
     topic: Option<String>,
 }

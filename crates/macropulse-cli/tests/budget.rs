@@ -41,7 +41,7 @@ fn a_sensor_that_never_misses_has_a_budget_that_closes() {
     let first = (-10.0 * 2.0 * 119.1 / 299_792_458.0_f64).exp();
     assert!((budget["pd"].as_f64().unwrap() - first).abs() < 1e-9, "{}", budget["pd"]);
     assert_eq!((&budget["closes"], budget["converter_loss"].is_f64()), (&true.into(), true));
-    // What has no end is null.
+    // Infinite numbers are null.
     assert!(budget["snr"].is_null() && budget["detected_per_micropulse"].is_null());
     for name in ["peregrine", "rosette-mid-40"] {
         let text = Desk::new().run(&format!("budget {name} {never}")).out;

@@ -1,4 +1,4 @@
-//! What is derived of the paper's sensor, and the lists.
+//! Numbers derived from the paper's sensor, and the lists.
 
 #![allow(missing_docs)]
 
@@ -42,7 +42,7 @@ fn every_ready_sensor_and_scene_is_right() {
             let name = entry["name"].as_str().unwrap();
             assert_ne!(entry["summary"], "", "{name}");
             assert_eq!(desk.run(&format!("check {name}")).code, Some(0), "{name}");
-            // What is printed to start from is right too, wherever it is put.
+            // A file printed to start from is right too, wherever it is put.
             let ran = desk.run(&format!("{list} {name}"));
             desk.put("mine.toml", &ran.out);
             assert_eq!(desk.run("check mine.toml").code, Some(0), "{name}");

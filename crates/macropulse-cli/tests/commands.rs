@@ -1,5 +1,5 @@
-//! What all commands have in common: how sensors and scenes are named, what JSON looks like, and the
-//! pages and completions made of it.
+//! Common behaviour of all commands: names of sensors and scenes, the form of JSON, manual pages and
+//! completions.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -143,7 +143,7 @@ fn all_json_has_a_version_and_one_vocabulary() {
     assert_eq!(desk.json("environments fog-50m --json")["values"]["visibility_km"], 0.05);
     let of = |name: &str| {
         let mut json = told.iter().find(|(line, _)| line == name).unwrap().1.clone();
-        // What depends on this machine.
+        // These depend on the machine.
         for own in ["times_s", "speed", "folder"] {
             json.as_object_mut().unwrap().remove(own);
         }
@@ -152,7 +152,8 @@ fn all_json_has_a_version_and_one_vocabulary() {
     assert_eq!(of("simulate peregrine wall -o run --json"), of("run/manifest.json"));
 }
 
-/// What is left out, what lies there already, what was made: none of it, but a result without a point.
+/// A quiet command does not tell what it leaves out, finds in the folder or makes. It tells of a result
+/// without a point.
 #[test]
 fn a_quiet_command_says_nothing() {
     let desk = Desk::new();

@@ -461,7 +461,7 @@ fn made_up_hardware_in_python_is_decoded_to_its_wall() {
     assert!(points.lines().skip(1).all(|line| (range(line) - 42.0).abs() < 4e-4), "{points}");
 }
 
-/// What is explained agrees with what is decoded, accepted or not, in words, JSON and pictures.
+/// Explanations agree with decoding, accepted or not, in words, JSON and pictures.
 #[test]
 fn an_explanation_says_what_was_decided() {
     let desk = Desk::new();
@@ -477,7 +477,7 @@ fn an_explanation_says_what_was_decided() {
     let decoded = desk.json(&line);
     let mut receiver_s = simulated["explained"].clone();
     for told in receiver_s.as_array_mut().unwrap() {
-        // What came to the detector only a simulation knows.
+        // Only a simulation knows the light at the detector.
         assert!(told["light"]["detections"].as_u64().unwrap() > 0, "{told}");
         told["light"] = serde_json::Value::Null;
     }
@@ -506,7 +506,7 @@ fn an_explanation_says_what_was_decided() {
     desk.refused(&line, &["--explain 6,0: kim-park-2016 has rows 0 to 5 and columns 0 to 847"]);
 }
 
-/// Of samples as well, and where nothing was found it is said why.
+/// Samples are explained as well, with a reason if nothing was found.
 #[test]
 fn an_explanation_of_samples_says_what_was_decided() {
     let desk = mini();
@@ -560,7 +560,7 @@ fn an_explanation_of_samples_says_what_was_decided() {
     assert!(read("again/index.html").contains("Sum of the marks, over the gate"));
 }
 
-/// What stands above the ticks is what they were made of.
+/// The light drawn above the ticks is the light that made them.
 #[test]
 fn light_that_is_explained_is_that_of_the_ticks() {
     let desk = Desk::new();
@@ -615,7 +615,7 @@ fn a_folder_of_points_has_a_page_and_a_manifest() {
     assert!(page.contains("<title>kim-park-2016-fixed, decoded"), "{}", &page[..400]);
     assert!(page.contains("What light there was is not known"));
     assert!(page.contains("href=\"./manifest.json\"") && !page.contains("<dt>scene</dt>"));
-    // What is older in the folder is named.
+    // Older files in the folder are named.
     let ran = desk.run(&format!("decode {SMALL} {files} --format csv -o again"));
     assert!(ran.err.contains("of an older run"), "{}", ran.err);
     assert!(ran.out.contains("manifest.json to again; open again/index.html"), "{}", ran.out);

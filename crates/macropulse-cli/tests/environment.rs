@@ -102,7 +102,7 @@ fn effects_are_switched_one_by_one() {
     assert_eq!(moving.len(), 5);
     assert!(!moving.contains(&"mirror-motion".to_owned()));
     assert_eq!(check("--without footprint")["assumptions"], check("")["assumptions"]);
-    // What the effect needs is asked for as if the list had been typed.
+    // The keys that an effect needs are asked for as if the list had been typed.
     desk.refused("check kim-park-2016 --with footprint", &["light.footprint_rays"]);
     desk.refused("check kim-park-2016 --with mirror-moton", &["did you mean `mirror-motion`?"]);
     let both = "check kim-park-2016 --with footprint --without footprint";

@@ -99,8 +99,8 @@ fn a_device_without_an_end() {
     all_ways(&desk, "zero", &["a device"]);
 }
 
-/// What fuzzers found: files at which a library that we read with panics, and a place so far away that a
-/// ray met what is not there.
+/// Findings of fuzzers: files at which a library that reads them panics, and a place so far away that rays
+/// met surfaces that are not there.
 #[test]
 fn damage_that_a_library_panics_at() {
     let desk = Desk::new();
@@ -161,7 +161,7 @@ fn a_text_without_an_end() {
     }
 }
 
-/// What a file is not is told by its beginning, however long it is.
+/// The beginning of a file tells that it is not of its kind, however long it is.
 #[test]
 fn files_of_nothing_but_zeros() {
     let desk = Desk::new();

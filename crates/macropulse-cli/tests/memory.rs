@@ -19,7 +19,8 @@ sys.exit(ended.returncode)";
 
 const THREADS: u32 = 2;
 
-/// What is estimated for a run of `sensor` in `scene` with two threads, and what it takes, bytes.
+/// Returns the memory estimated for a run of `sensor` in `scene` with two threads, and the memory that it
+/// takes, bytes.
 fn memory(desk: &Desk, sensor: &str, scene: &str) -> (f64, f64) {
     let text = format!("version = 1\nsensor = \"{sensor}\"\nscene = \"{scene}\"\n");
     desk.put("s.toml", &text);
@@ -54,8 +55,8 @@ fn an_estimate_is_near_what_a_run_takes() {
     }
 }
 
-/// Prints the table of docs/hardening.md. An estimate may be too high, as of coded-360 at the wall, of which most shots
-/// are missed; one that is too low would break the limit.
+/// Prints the table of docs/hardening.md. An estimate may be too high, as for coded-360 at the wall, where
+/// most shots miss. An estimate that is too low would break the limit.
 #[test]
 #[ignore = "slow: before a release"]
 fn every_sensor_takes_about_what_is_estimated() {

@@ -1,4 +1,4 @@
-//! What is said of meshes: what is left out of them, and files that lie outside the folder of a scene.
+//! Messages on meshes: on parts that are left out, and on files outside the folder of a scene.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 

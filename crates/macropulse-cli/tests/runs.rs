@@ -1,5 +1,5 @@
-//! What a run leaves in a folder, however it ends: whole files, and a manifest that describes no
-//! others than its own.
+//! Files that a run leaves in a folder, however it ends: whole files, and a manifest that describes no others
+//! than its own.
 #![cfg(unix)]
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -249,7 +249,7 @@ fn run_replaces_its_own_files_and_none_of_a_user() {
         let words = [name, "not known to be written by macropulse", "another folder"];
         desk.refused("simulate peregrine wall --format npy,pcd -o mine", &words);
         assert_eq!(fs::read_to_string(folder.join(name)).unwrap(), text);
-        // What no run writes is in nobody's way.
+        // A file that this run does not write is in nobody's way.
         desk.put("mine/scan-000007.pcd", "mine");
         fs::remove_file(folder.join(name)).unwrap();
         assert_eq!(desk.run("simulate peregrine wall --format pcd -o mine").code, Some(0));

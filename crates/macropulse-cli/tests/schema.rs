@@ -1,5 +1,5 @@
-//! The schemas that editors read: they are those of the program, a validator that others wrote takes
-//! every ready file and example by them, and their limits are those that are checked.
+//! Schemas that editors read. They are those of the program, and their limits are those that are checked. A
+//! validator that others wrote accepts every ready file and example by them.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -41,7 +41,7 @@ fn a_validator_of_others_takes_the_ready_files_and_no_slips() {
     assert!(said.contains("files are valid"), "{said}");
 }
 
-/// What is printed to start from does not name a schema that lies elsewhere.
+/// A file printed to start from does not name a schema that lies elsewhere.
 #[test]
 fn what_is_printed_names_no_schema() {
     let desk = Desk::new();

@@ -35,7 +35,7 @@ fn a_run_leaves_its_scans_and_a_manifest() {
     assert_eq!(manifest["files"].as_array().unwrap().len(), 7);
 }
 
-/// Where a moving sensor was stands beside its scans, and with the points.
+/// The pose of a moving sensor is in the manifest, scan by scan, and in the files of points.
 #[test]
 fn a_run_of_a_moving_sensor_tells_where_each_scan_began() {
     let desk = Desk::new();
@@ -213,7 +213,7 @@ fn what_a_killed_run_has_left_is_gone_after_the_next() {
     assert!(!is_left(), "{:?}", desk.files());
 }
 
-/// Where an image is asked for and there is none, that is said.
+/// A range image of a rosette comes with a warning. Without an image, or with `-q`, there is none.
 #[test]
 fn the_range_image_of_a_rosette_is_told_to_be_a_strip() {
     let desk = Desk::new();

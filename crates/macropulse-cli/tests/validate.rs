@@ -1,4 +1,4 @@
-//! What is published and what is forecast, beside what is computed; and the page of the guide on it.
+//! Published and forecast numbers beside computed ones, and the page of the guide on them.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -6,7 +6,7 @@ use crate::common;
 
 use common::Desk;
 
-/// `docs/validation.md` is what the command writes. Where that changes, copy it:
+/// `docs/validation.md` is the output of the command. If the output changes, copy it:
 /// `macropulse validate -o validation && cp validation/validation.md docs/`.
 #[test]
 #[ignore = "slow: before a release"]

@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let receiver = Receiver { gate_ticks: (0, 400_000), ..Receiver::matched(2_500) };
     // Fired 16 000 ticks apart, in words 1 and 2.
     let log = ShotLog::of_one_channel(&[0, 40_000_000], &[1, 2]);
-    // What a converter would put out: the marks of both, 40 000 and 41 000 ticks later, and noise.
+    // Output of a converter: the marks of both, 40 000 and 41 000 ticks later, and noise.
     let mut tick: Vec<u32> = (0..600).map(|n| n * 97).collect();
     for (word, arrives) in [(1, 40_000), (2, 16_000 + 41_000)] {
         tick.extend(codebook.marks(0, word).iter().map(|mark| arrives + u32::from(*mark)));

@@ -4,11 +4,11 @@ use std::ops::{Range, RangeInclusive};
 
 use crate::shot_log::ShotLog;
 
-/// What must be known around a run of **owned** shots to decode them as if the whole stream were at
+/// Times that must be known around a run of **owned** shots, to decode them as if the whole stream were at
 /// hand. All times are fs.
 ///
-/// Who simulates a band and who decodes a recorded stream cut by the same rule, and so the receiver
-/// is given the same shots and the same ticks.
+/// Simulations of a band and decoders of a recorded stream cut by the same rule. So the receiver is given the
+/// same shots and the same ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cut {
     /// Length of a tick.
@@ -19,9 +19,9 @@ pub struct Cut {
     pub jitter_fs: i64,
     /// How long the receiver listens to a shot, from its firing on.
     pub listening_fs: i64,
-    /// How long before the first owned shot the ticks begin, and how long after the last gate is
-    /// closed they end: long enough for all that overlaps with light of an owned shot to be there as a
-    /// whole, and to be told whose it is.
+    /// How long before the first owned shot the ticks begin, and how long after the last gate is closed they
+    /// end. All light that overlaps with light of an owned shot is then there as a whole, and its shot can be
+    /// told.
     pub lead_fs: i64,
     /// How long before the first owned shot others must be known: their light may still be under way
     /// when the ticks begin.
@@ -34,8 +34,8 @@ fn quotient(time: i64, part: i64) -> i64 {
 }
 
 impl Cut {
-    /// When shots are fired that belong to the log of owned ones, the first of which is fired at
-    /// `first` and the last at `last`.
+    /// Returns the range of firing times in the log of owned shots, the first fired at `first` and the last
+    /// at `last`.
     pub fn shots(&self, first: i64, last: i64) -> RangeInclusive<i64> {
         first.saturating_sub(self.history_fs)..=self.closes(last)
     }
@@ -46,7 +46,7 @@ impl Cut {
         self.opens(first)..closes.saturating_add(1)
     }
 
-    /// The first absolute tick that belongs to owned shots of which the first is fired at `first`.
+    /// Returns the first absolute tick that belongs to owned shots, if the first of them is fired at `first`.
     pub fn opens(&self, first: i64) -> i64 {
         quotient(first.saturating_sub(self.lead_fs), self.tick_fs)
     }
@@ -58,16 +58,16 @@ impl Cut {
         clocks.saturating_mul(quotient(self.clock_fs, self.tick_fs))
     }
 
-    /// The part of the log of a band that its receiver is given: without the shots that were fired before
-    /// the ticks begin. Of their light only some is there; a receiver that knew of them would take that
-    /// of others for theirs.
+    /// Returns the part of the log of a band that its receiver is given: without the shots that were fired
+    /// before the ticks begin. Only some of their light is there; a receiver that knew of them would take
+    /// light of others for theirs.
     pub fn known(&self, log: &ShotLog) -> ShotLog {
         let Some(first) = log.fired_at_fs.get(log.owned.start) else { return log.clone() };
         let opens_fs = self.opens(*first).saturating_mul(self.tick_fs);
         log.part(log.fired_at_fs.partition_point(|fired| *fired < opens_fs)..log.len())
     }
 
-    /// Whether a stream can be cut so: its ticks and clock last some time, and nothing ends before it
+    /// Returns true if a stream can be cut so: its ticks and clock last some time, and nothing ends before it
     /// begins.
     pub(crate) fn is_possible(&self) -> bool {
         let spans = [self.jitter_fs, self.listening_fs, self.lead_fs, self.history_fs];

@@ -25,7 +25,7 @@ impl Histograms {
         self.cycles.len()
     }
 
-    /// Whether there is no histogram at all.
+    /// True if there is no histogram at all.
     pub fn is_empty(&self) -> bool {
         self.cycles.is_empty()
     }

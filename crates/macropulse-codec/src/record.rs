@@ -1,4 +1,4 @@
-//! What a receiver is given beside its shot log.
+//! Records: the input of a receiver beside its shot log.
 
 use crate::{Beats, Histograms, Samples, Taps, Ticks};
 
@@ -18,14 +18,14 @@ macro_rules! kinds {
             }
         }
 
-        /// What a receiver is given beside its shot log.
+        /// The input of a receiver beside its shot log.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum Record<'a> {
             $($(#[$doc])* $Kind(&'a $Kind),)+
         }
 
         impl Record<'_> {
-            /// Which kind of record it is.
+            /// Returns the kind of this record.
             pub fn kind(&self) -> RecordKind {
                 match self { $(Self::$Kind(_) => RecordKind::$Kind,)+ }
             }
@@ -52,20 +52,20 @@ macro_rules! kinds {
 }
 
 kinds! {
-    /// Of time-to-digital converters.
+    /// Ticks of time-to-digital converters.
     Ticks, "ticks";
-    /// Of analogue-to-digital converters.
+    /// Samples of analogue-to-digital converters.
     Samples, "samples";
-    /// Of counters, added up over the pulses of a burst.
+    /// Histograms of counters, added up over the pulses of a burst.
     Histograms, "histograms";
-    /// Of lock-in detectors.
+    /// Taps of lock-in detectors.
     Taps, "taps";
-    /// Of coherent detectors.
+    /// Beats of coherent detectors.
     Beats, "beats";
 }
 
 impl RecordKind {
-    /// Whether there is one of each shot, made of the light of that shot alone.
+    /// True if there is a record of each shot, made of the light of that shot alone.
     pub fn is_by_shot(self) -> bool {
         matches!(self, Self::Histograms | Self::Taps | Self::Beats)
     }
@@ -84,7 +84,7 @@ impl Given {
         }
     }
 
-    /// Whether there is none.
+    /// True if the record is empty.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -11,7 +11,7 @@ pub struct Samples {
     pub epoch: i64,
     /// Detector channels, ascending; one alone where the sensor has a single one.
     pub channel: Vec<u16>,
-    /// Codes, as many of each channel: 0 is the level without light of any lidar.
+    /// Codes, channel by channel, the same number of each. 0 is the level without light of any lidar.
     pub code: Vec<i16>,
 }
 
@@ -30,7 +30,7 @@ impl Samples {
         }
     }
 
-    /// Whether there is no sample at all.
+    /// True if there is no sample.
     pub fn is_empty(&self) -> bool {
         self.code.is_empty()
     }

@@ -98,7 +98,7 @@ impl ShotLog {
         channels.map(|shots| (shots.to_vec(), of_channel(shots))).collect()
     }
 
-    /// Whether there is no shot at all.
+    /// True if there is no shot.
     pub fn is_empty(&self) -> bool {
         self.fired_at_fs.is_empty()
     }

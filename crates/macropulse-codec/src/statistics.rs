@@ -60,10 +60,10 @@ pub fn normal_quantile(p: f64) -> f64 {
 /// > z + pq/(2(k + 2))·z/φ² + pq/(k + 2)²·[(q − p)/3·(1 + 2z²)/φ³ + pq/8·z(7 + 6z²)/φ⁴],
 /// > √(pq/(k + 2))/φ.
 ///
-/// The mean is right to 4·10⁻⁴ where 20 or more are below it and one or more above, or the other way
-/// round, and to 0.01 everywhere. Of the standard deviation only the first term is taken: it is too
-/// small by up to 4 % where ten or more are on both sides, by up to 28 % elsewhere. `count` is held
-/// within 1 and 10¹⁵, `place` within 1 and `count`.
+/// The mean is right to 4·10⁻⁴ where 20 or more are below it and one or more above, or the other way round,
+/// and to 0.01 everywhere. The standard deviation has its first term only. It is too small by up to 4 % if
+/// ten or more are on both sides, and by up to 28 % elsewhere. `count` is held within 1 and 10¹⁵, `place`
+/// within 1 and `count`.
 pub fn normal_order(place: f64, count: f64) -> (f64, f64) {
     let count = count.clamp(1.0, 1e15);
     let place = place.clamp(1.0, count);
@@ -113,8 +113,9 @@ pub fn binomial_tail(trials: usize, p: f64, least: usize) -> f64 {
     sum.min(1.0)
 }
 
-/// P(X ≥ k) of the hypergeometric X: the chance that `least` or more of `drawn` are `marked` ones, drawn
-/// without putting back from so many `marked` and `others`. Summed from the smaller side.
+/// P(X ≥ k) of the hypergeometric X: the chance that `least` or more of `drawn` items are marked. They are
+/// drawn without replacement from `marked` marked items and `others` unmarked ones. Summed from the smaller
+/// side.
 pub fn hypergeometric_tail((marked, others): (u32, u32), drawn: u32, least: u32) -> f64 {
     let all = u64::from(marked) + u64::from(others);
     let (fewest, most) = (drawn.saturating_sub(others), marked.min(drawn));
@@ -179,8 +180,9 @@ pub fn poisson_from(mean: f64, first: u32, last: u32) -> Vec<f64> {
     all.take_while(|(k, _)| *k <= last).map(|(_, chance)| chance).collect()
 }
 
-/// The probability that the power of so many `phasors` together is above `threshold`, where the `signal` in them has
-/// such a power. Powers are in units of the mean of one phasor of noise alone, whose two parts are normal.
+/// The probability that the total power of `phasors` phasors is above `threshold`. The total power of the
+/// signal in them is `signal`. Powers are in units of the mean of one phasor of noise alone, whose two parts
+/// are normal.
 ///
 /// Given the number k of a Poisson variable of the mean `signal`, the power is a gamma variable of `phasors` + k: the
 /// generalised Marcum function Q(√(2·signal), √(2·threshold)) \[Kay93\].
@@ -212,8 +214,8 @@ pub fn power_tail(phasors: u32, signal: f64, threshold: f64) -> f64 {
 /// where `offered` is the mean number of calls that come within the time one takes. It does not
 /// depend on how the times are distributed.
 ///
-/// Summed as 1/B = 1 + c/a + c·(c − 1)/a² + …, of which about as many terms count as the root of a: the sum
-/// ends where terms no longer count, or where it is too large for a number and B is 0.
+/// Summed as 1/B = 1 + c/a + c·(c − 1)/a² + …, with about √a terms that count. The sum ends at negligible
+/// terms, or where it is too large for a number and B is 0.
 pub fn erlang_b(offered: f64, servers: u32) -> f64 {
     if offered <= 0.0 {
         return 0.0;

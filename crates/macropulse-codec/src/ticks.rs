@@ -31,7 +31,7 @@ pub struct Tick {
 }
 
 impl Tick {
-    /// What ticks of a stream ascend by: time, and the channel at once.
+    /// Returns the sort key of ticks in a stream: first the time, then the channel.
     pub fn order(&self) -> (i64, u16) {
         (self.tick, self.channel)
     }
@@ -63,7 +63,7 @@ impl Ticks {
         self.tick.len()
     }
 
-    /// Whether there is no tick at all.
+    /// True if there is no tick.
     pub fn is_empty(&self) -> bool {
         self.tick.is_empty()
     }

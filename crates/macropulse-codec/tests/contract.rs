@@ -1,4 +1,4 @@
-//! What a receiver refuses, and that nothing it is given makes it panic.
+//! Receivers refuse wrong input, and no input makes them panic.
 
 #![allow(clippy::unwrap_used)]
 
@@ -72,7 +72,7 @@ fn ticks() -> Ticks {
     Ticks { tick, ..Ticks::default() }
 }
 
-/// What the receiver says when one thing is wrong; without it, three shots are found.
+/// Returns the error of the receiver after `spoil` made one thing wrong. Without it, three shots are found.
 fn refused(spoil: impl Fn(&mut Receiver, &mut ShotLog, &mut Ticks)) -> Error {
     let (mut receiver, mut log, mut ticks) = (receiver(), log(), ticks());
     assert_eq!(receiver.decode(&codebook(), &log, &ticks).unwrap().len(), 3);
@@ -248,7 +248,7 @@ fn sampled() -> (Receiver, Samples) {
     (Receiver { method, ..receiver() }, samples)
 }
 
-/// What the receiver of samples says when one thing is wrong.
+/// Returns the error of the receiver of samples after `spoil` made one thing wrong.
 fn refused_sampled(spoil: impl Fn(&mut Receiver, &mut ShotLog, &mut Samples)) -> Error {
     let ((mut receiver, mut samples), mut log) = (sampled(), log());
     assert_eq!(receiver.decode(&codebook(), &log, &samples).unwrap().shot, [0, 1, 2]);
@@ -397,7 +397,7 @@ prop_compose! {
 }
 
 prop_compose! {
-    /// A receiver of which at most one setting is out of the ordinary.
+    /// A receiver with at most one setting out of the ordinary, or with all of them (`wrong` = 7).
     fn nearly_sane()(
         (any, odd, odd_threshold) in (any_receiver(), any_correlation(), any::<u16>()),
         kind in 0..KINDS.len(),
@@ -496,7 +496,7 @@ static DECODED: AtomicUsize = AtomicUsize::new(0);
 proptest! {
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(3), ..ProptestConfig::with_cases(3000) })]
 
-    /// What is decoded is of owned shots, in order.
+    /// All returns belong to owned shots, in order.
     fn whatever_is_given_is_decoded_or_refused(
         receiver in nearly_sane(),
         log in any_log(),

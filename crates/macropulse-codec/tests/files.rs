@@ -235,7 +235,7 @@ fn a_binary_file_that_is_cut_off_says_where() {
     let mut longer = bytes.clone();
     longer.extend(&bytes[128 + 36..]);
     assert!(read_shots(&longer).unwrap_err().to_string().contains("3 shots only"));
-    // Of a stream the end is not known.
+    // The end of a stream is not known.
     let endless = written_shots(Form::Binary, &ShotHeader::default(), &shots(3));
     assert_eq!(read_shots(&endless[..128 + 18]).unwrap().1.len(), 1);
 }
@@ -305,7 +305,7 @@ fn a_stream_is_cut_into_bands_with_all_that_belongs_to_them() {
         next += log.owned.len() as u64;
         let fired = |at: usize| log.fired_at_fs[at];
         let (first, last) = (fired(log.owned.start), fired(log.owned.end - 1));
-        // Of shots that were fired before the ticks begin only some light is there.
+        // Shots fired before the ticks begin have only part of their light there, and are left out.
         let wanted = CUT.opens(first) * TICK_FS..=*CUT.shots(first, last).end();
         let all = shots.iter().filter(|shot| wanted.contains(&shot.fired_fs)).count();
         assert_eq!(log.len(), all);
@@ -355,7 +355,7 @@ fn what_is_explained_is_what_was_decided() {
                 }
                 let is_correlated = kind == ReceiverKind::Matched;
                 if is_correlated && let Some(one) = told.first() {
-                    // Counted mark by mark, there are as many.
+                    // Counting mark by mark gives the same number.
                     let lag = (one.tof * 1e15 + log.fired_at_fs[shot] as f64) / TICK_FS as f64;
                     let lag = lag as i64 - explained.fired_tick;
                     let found = explained.found[(lag - explained.gate.start) as usize];

@@ -27,7 +27,7 @@ fn gaussian(bins: f64) -> Pulse {
     Pulse::Gaussian { rms_fs: bins * BIN_FS as f64 }
 }
 
-/// Shares of a Gaussian pulse in each of so many bins.
+/// Share of a Gaussian pulse in each of the first `bins` bins.
 fn shares(bins: usize, middle: f64, rms: f64) -> Vec<f64> {
     let normal = Normal::new(middle, rms).unwrap();
     (0..bins).map(|bin| normal.cdf(bin as f64 + 1.0) - normal.cdf(bin as f64)).collect()
@@ -52,8 +52,8 @@ fn drawn(mean: &[f64], rng: &mut ChaCha8Rng) -> Vec<u32> {
     mean.iter().map(draw).collect()
 }
 
-/// The counts of a detector that stops at the first photon of each of `cycles` laser pulses, each of
-/// which brings so many photons in each bin on average.
+/// Counts of a detector that stops at the first photon of each of `cycles` laser pulses. A pulse brings
+/// `photons[bin]` photons in a bin on average.
 fn stopped(photons: &[f64], cycles: u32, rng: &mut ChaCha8Rng) -> Vec<u32> {
     let mut left = u64::from(cycles);
     let mut draw = |mean: &f64| {
@@ -110,7 +110,7 @@ fn coates_gives_the_photons_of_each_bin() {
     assert!((mean(&corrected) - 0.055).abs() < error(&corrected), "{}", mean(&corrected));
     // Control: what is counted is not what came.
     assert!((mean(&raw) - 0.055).abs() > 100.0 * error(&raw));
-    // Where the last cycle is counted, nothing more is known.
+    // After the bin that stops the last cycle, nothing is known.
     assert_eq!(
         coates(&[1, 1, 0, 5], 2),
         [std::f64::consts::LN_2, std::f64::consts::LN_2, 0.0, 0.0]
@@ -217,10 +217,10 @@ fn bias_is_below_a_tenth_of_a_bin() {
     }
 }
 
-/// Returns where there is background alone: no more than 2 % of N = 6000 histograms, seed 5, have one
-/// (α = 10⁻³: 120 expected, 155 at most), and no fewer than a tenth of that; at 0.01 counts a bin three
-/// counts are needed together, which are rarer, as two would be too frequent. The control takes the matched
-/// filter for normal, and has several times as many where counts are few.
+/// Returns from background alone: no more than 2 % of N = 6000 histograms, seed 5, have one (α = 10⁻³: 120
+/// expected, 155 at most), and no fewer than a tenth of that. At 0.01 counts a bin they are rarer: three
+/// counts must come together, as two would be too frequent. The control takes the matched filter for normal,
+/// and finds several times more in histograms with few counts.
 #[test]
 fn false_returns_are_as_rare_as_stated() {
     const ALL: usize = 6000;
@@ -270,10 +270,10 @@ fn needed(background: f64, rng: &mut ChaCha8Rng) -> f64 {
     (few * many).sqrt()
 }
 
-/// Photons fall with the square of the range and rise with the laser pulses, as the background does: with
-/// 16 times the pulses a surface is found 2 times as far where background limits it, 4 times as far
-/// where none does. Within 5 %: N = 150 leaves 2.5 % of the photons in each of two, and half of that of
-/// the range (α = 10⁻³).
+/// Photons fall with the square of the range. They rise with the laser pulses, as the background does. With
+/// 16 times the pulses a surface is found 2 times as far if background limits it, and 4 times as far if none
+/// does. Within 5 %: N = 150 leaves 2.5 % of the photons in each of two, and half of that of the range
+/// (α = 10⁻³).
 #[test]
 fn reach_in_sunlight_goes_with_the_fourth_root_of_the_laser_pulses() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);

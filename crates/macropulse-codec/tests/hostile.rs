@@ -1,5 +1,5 @@
-//! What a program may hand over by mistake: public structs filled with anything. It is refused or put
-//! up with, never a panic, and never in much memory.
+//! Public structs filled with anything, as a program may hand them over by mistake. They are refused or put
+//! up with, without a panic and without much memory.
 
 #![allow(clippy::unwrap_used)]
 

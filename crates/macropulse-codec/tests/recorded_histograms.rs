@@ -147,7 +147,7 @@ fn coates_restores_the_background_of_a_real_sensor() {
     assert!((corrected - 1.0).abs() < 0.03, "{corrected}");
 }
 
-/// Where the chip sees one surface, our strongest return is at its distance, from 6 to 18 cm.
+/// In zones in which the chip sees one surface, our strongest return is at its distance, from 6 to 18 cm.
 #[test]
 fn one_surface_is_where_the_chip_says() {
     let Some(recording) = Recording::open("pyramid.json") else { return };
@@ -169,8 +169,8 @@ fn one_surface_is_where_the_chip_says() {
     assert!(near * 100 >= off.len() * 90, "{near} of {}", off.len());
 }
 
-/// Where the chip sees two surfaces within 40 cm, two of ours are within 20 mm of them in most zones. The
-/// control compares with what the chip saw in another zone.
+/// In most zones in which the chip sees two surfaces within 40 cm, two of our returns are within 20 mm of
+/// them. The control takes our returns of another zone.
 #[test]
 fn two_surfaces_are_where_the_chip_says() {
     for name in ["tall_block.json", "pyramid.json"] {

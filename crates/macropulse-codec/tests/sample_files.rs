@@ -1,5 +1,5 @@
-//! Samples as files: what is written is read, what is wrong has a place, bands are cut out of a stream
-//! as they were put into it, and no bytes make a reader panic.
+//! Samples as files. Reading gives what was written, and an error names its place. Bands are cut out of a
+//! stream as they were put into it, and no bytes make a reader panic.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -230,7 +230,7 @@ fn what_is_missing_at_the_ends_is_left_out_and_a_hole_is_told() {
     let short = Samples { epoch: -150, channel: vec![2], code: vec![0; 33_150] };
     let said = refused(&[uneven, short]);
     assert!(said.contains("record all channels for the same time"), "{said}");
-    // Where nothing is looked for, a hole does not matter.
+    // A hole does not matter at a time when no light is looked for.
     let few = [samples(-300, 33_000), samples(90_000, 90_010)];
     assert_eq!(bands(&shots, &written(&header(), &few)).unwrap().len(), 6);
 }

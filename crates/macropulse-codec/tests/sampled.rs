@@ -57,13 +57,13 @@ fn rms(values: &[f64]) -> f64 {
     mean(&values.iter().map(|value| value * value).collect::<Vec<_>>()).sqrt()
 }
 
-/// A wall of so many photons per mark, about 149 m away.
+/// A wall of `photons` photons per mark, about 149 m away.
 fn wall(photons: f64, shots: usize, seed: u64) -> Channel {
     let ticks = draw(shots, (2478.0, 2492.0), seed);
     Channel::of(&ticks.iter().map(|ticks| (*ticks, photons)).collect::<Vec<_>>(), seed)
 }
 
-/// Where light comes while own marks leave, what is missing is known; everything else is found.
+/// N = 600: at least 594 shots are found, with all three marks and none at a wrong range.
 #[test]
 fn a_faint_wall_is_found_at_its_range() {
     let channel = wall(FAINT, 600, 1);
@@ -136,7 +136,7 @@ fn false_returns(false_alarm: f64, sampling: Sampling) -> usize {
 }
 
 /// N = 4000 shots, α = 1e-4 of a Poisson count of 40: no more than 67, no less than a tenth, 4. Negative
-/// control: a receiver that accepts ten times as many breaks the bound.
+/// control: a receiver that accepts ten times the false returns breaks the bound.
 #[test]
 fn noise_is_taken_for_light_as_often_as_accepted() {
     let most = 67;
@@ -179,8 +179,8 @@ fn a_mixed_scene_has_no_wrong_ranges() {
     assert_eq!(of_shots + rejects as usize, shots - 8);
 }
 
-/// A mark of a bright echo falls beside one of another echo: that is found by what is left, and the mark
-/// counts where it stands out from what may be left of the bright one.
+/// A mark of a bright echo falls beside one of another echo. The other echo is found in the remainder, and
+/// its mark counts if it exceeds the possible residual of the bright one.
 #[test]
 fn what_bright_light_hides_is_found_in_what_is_left() {
     let book = codebook();
@@ -215,7 +215,7 @@ fn what_bright_light_hides_is_found_in_what_is_left() {
     }
 }
 
-/// Two surfaces each: as many returns as wanted, by what is picked.
+/// Two surfaces per shot: a shot has the wanted number of returns, chosen by `pick`.
 #[test]
 fn a_shot_has_as_many_returns_as_it_met_surfaces() {
     let mut channel = Channel::of(&[(500.2, 2000.0); 5], 8);
@@ -286,8 +286,7 @@ fn a_word_may_be_one_mark() {
     let mut channel = wall(3.0 * FAINT, 1, 16);
     let book = macropulse_codec::code::Codebook::single();
     channel.log.word = vec![0];
-    // Of the three marks that are made the first is that of a word of one, and the others come behind the
-    // gate.
+    // Three marks are made. The first is the word of one mark, and the others come behind the gate.
     channel.echoes.truncate(1);
     let returns = receiver().decode(&book, &channel.log, &channel.samples()).unwrap();
     assert_eq!((returns.shot[0], returns.peak[0], returns.marks[0]), (0, 1, 1));
@@ -350,8 +349,8 @@ fn every_processor_gives_the_same_bits() {
     }
 }
 
-/// Faint walls, bright ones, clipped ones, and some too faint, N = 240 shots: what is explained of each is
-/// what was decoded of it, and its marks add up to the sum that was told.
+/// N = 240 shots at faint, bright, clipped and too faint walls. The explanation of a shot agrees with its
+/// decoded returns, and its marks add up to the reported sum.
 #[test]
 fn what_is_explained_is_what_was_decided() {
     let ticks = draw(240, (300.0, 2490.0), 11);

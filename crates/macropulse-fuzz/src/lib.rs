@@ -1,11 +1,11 @@
-//! What Macropulse is attacked with: a function for each kind of input, to be given any bytes.
+//! The attack on Macropulse: a function for each kind of input, to be given any bytes.
 //!
-//! [`TARGETS`] is called by two: by the fuzzers in `fuzz/`, which look for inputs that reach code that
-//! none has reached yet, and by the test `corpus`, which runs everywhere and gives each target its
-//! corpus and what [`mutate`] makes of it.
+//! [`TARGETS`] has two callers. The fuzzers in `fuzz/` look for inputs that reach code that none has reached
+//! yet. The test `corpus` runs everywhere, and gives each target its corpus and the mutations that [`mutate`]
+//! makes of it.
 //!
-//! A target returns, whatever it is given. It panics if something in Macropulse does, or if an answer is
-//! not what is promised of it, as an error without words.
+//! A target returns, whatever it is given. It panics if something in Macropulse does, or if an answer breaks
+//! a promise, as an error without words does.
 
 mod clouds;
 pub mod mutate;
@@ -25,7 +25,7 @@ use tempfile::TempDir;
 pub struct Target {
     /// Its name, that of its corpus and its fuzzer.
     pub name: &'static str,
-    /// What it does with bytes.
+    /// The function that takes the bytes.
     pub run: fn(&[u8]),
     /// The longest input that is worth its time, bytes.
     pub longest: usize,
@@ -83,10 +83,10 @@ pub fn target(name: &str) -> Option<&'static Target> {
     TARGETS.iter().find(|target| target.name == name)
 }
 
-/// Gives `bytes`, as many as are worth their time, to the target called `name`.
+/// Gives `bytes` to the target called `name`, unless they are longer than its `longest`.
 ///
 /// # Panics
-/// If there is none, and where the target does.
+/// If there is no such target, and if the target panics.
 #[expect(clippy::panic, reason = "a misspelt fuzzer does nothing for ever")]
 pub fn run(name: &str, bytes: &[u8]) {
     let Some(target) = target(name) else { panic!("there is no target {name}") };

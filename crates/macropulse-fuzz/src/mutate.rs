@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// What hurts where a number is expected, or a line.
+/// Bytes that hurt in place of a number or a line.
 const WORDS: [&[u8]; 16] = [
     b"0",
     b"-1",

@@ -21,7 +21,7 @@ const CUT: Cut = Cut {
     history_fs: 3_600_000,
 };
 
-/// What parts the shots from the ticks of a stream.
+/// Separator of the shots from the ticks of a stream.
 const PART: &[u8] = b"\n----\n";
 
 fn told<T>(read: Result<T, Error>) -> Option<T> {
@@ -61,7 +61,7 @@ pub fn stream(bytes: &[u8]) {
     }
 }
 
-/// What the samples of the sensor begin with.
+/// Header of the sensor's samples.
 const SAMPLES: SampleHeader = SampleHeader {
     tick_fs: TICK_FS,
     channels: LIMITS.channels,
@@ -88,7 +88,7 @@ pub fn samples(bytes: &[u8]) {
     }
 }
 
-/// What the histograms of the sensor begin with.
+/// Header of the sensor's histograms.
 const HISTOGRAMS: HistogramHeader =
     HistogramHeader { bin_fs: TICK_FS, offset_fs: 0, bins: 32, digest: None, count: None };
 
@@ -101,7 +101,7 @@ pub fn histograms(bytes: &[u8]) {
     }
 }
 
-/// What the beats of the sensor begin with.
+/// Header of the sensor's beats.
 const BEATS: BeatHeader = BeatHeader { ramps: 2, peaks: 2, digest: None, count: None };
 
 /// Reads `bytes` as beats, and cuts those of three shots out of them.
@@ -115,7 +115,7 @@ pub fn beats(bytes: &[u8]) {
     }
 }
 
-/// What the taps of the sensor begin with.
+/// Header of the sensor's taps.
 const TAPS: TapHeader = TapHeader { taps: 8, digest: None, count: None };
 
 /// Reads `bytes` as taps, and cuts those of three shots out of them.

@@ -10,7 +10,7 @@ use macropulse_study::designs::Requirements;
 
 use crate::{assert_says, with_files};
 
-/// Pixels of the largest sensor of which a scan is made.
+/// Pixels of the largest sensor that is scanned.
 const MOST_PIXELS: u64 = 64;
 
 /// Most memory of such a scan, bytes.

@@ -1,4 +1,4 @@
-//! What is typed behind `--set` and `--vary`.
+//! Values typed behind `--set` and `--vary`.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -9,7 +9,7 @@ use macropulse_study::sweep::{Axis, Metric, Shard};
 
 use crate::assert_says;
 
-/// Changes a ready sensor, or a ready scene, by a `KEY=VALUE`, of which the value is TOML.
+/// Changes a ready sensor, or a ready scene, by a `KEY=VALUE` with a value in TOML.
 pub fn set(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let Some((key, value)) = text.split_once('=') else { return };

@@ -53,8 +53,8 @@ pub fn encode<'py>(
 ///         `"sparse={length=841, weight=29, words=64, seed=1}"`.
 ///
 /// Returns:
-///     A dictionary for each, with the keys of `families` in `macropulse codes --json`, and `matrix`, shape (n, n)
-///     of the words compared: the highest periodic cross-correlation of each with each other one,
+///     A dictionary for each, with the keys of `families` in `macropulse codes --json`. Its `matrix`, shape
+///     (n, n) of the words compared, has the highest periodic cross-correlation of each with each other one,
 ///     and on the diagonal the highest sidelobe.
 ///
 /// Raises:

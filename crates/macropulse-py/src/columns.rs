@@ -41,10 +41,10 @@ fn over<'py, T: Element>(
     scan: &Bound<'py, Scan>,
     entries: &[T],
 ) -> PyResult<Bound<'py, PyArray1<T>>> {
-    // SAFETY: all callers give a column of `scan` itself. Its class is frozen: its columns are never
-    // written to, moved or freed before the scan is, which the array holds a reference to, as its
-    // base, for as long as it lives. The array is marked as not to be written to before anyone sees
-    // it, and as it does not own its memory, NumPy does not let that mark be taken away.
+    // SAFETY: all callers give a column of `scan` itself. Its class is frozen: its columns are never written
+    // to, moved or freed before the scan is. The array holds a reference to the scan, as its base, for as
+    // long as it lives. The array is marked as read-only before anyone sees it. As it does not own its
+    // memory, NumPy does not let that mark be taken away.
     let array =
         unsafe { PyArray1::borrow_from_array(&ArrayView1::from(entries), scan.clone().into_any()) };
     array.try_readwrite().map_err(|why| crate::error::fault(&why))?.make_nonwriteable();

@@ -1,4 +1,4 @@
-//! What can go wrong, as exceptions, in the sentences of the program.
+//! Errors as exceptions, in the sentences of the program.
 
 use std::error::Error as StdError;
 use std::io;
@@ -23,7 +23,7 @@ pyo3::create_exception!(
     "A fault of Macropulse and not of what it was given: please report it."
 );
 
-/// What is changed is typed behind `--set` in the program, and has no such origin here.
+/// Origin of a change in the messages of the program, stripped here: Python has no `--set`.
 const SET: &str = "--set: ";
 
 /// An error of the library as an exception.
@@ -34,7 +34,7 @@ pub trait Raise {
 
 /// As [`Raise::raise`] of an error.
 pub trait OrRaise<T> {
-    /// What is there, or else the exception.
+    /// Returns the value, or else the exception.
     ///
     /// # Errors
     /// The exception of the error.
@@ -47,15 +47,16 @@ impl<T, E: Raise> OrRaise<T> for Result<T, E> {
     }
 }
 
-/// What is asked for cannot be.
+/// Returns the exception for a request that cannot be met.
 pub fn wrong(sentence: impl Into<String>) -> PyErr {
     Error::new_err(sentence.into())
 }
 
-/// Warns of what a user should know although nothing went wrong, as of the line that called us.
+/// Warns of something that a user should know although nothing went wrong. The warning names the line that
+/// called us.
 ///
 /// # Errors
-/// What warnings are turned into, if they are.
+/// The exception that Python turns warnings into, if it does.
 pub fn warned(py: Python<'_>, told: impl Into<String>) -> PyResult<()> {
     let category = py.get_type::<PyUserWarning>();
     py.import("warnings")?.call_method1("warn", (told.into(), category, 2)).map(|_| ())

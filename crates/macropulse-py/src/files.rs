@@ -57,7 +57,7 @@ fn format_of(path: &Path, named: Option<&str>) -> PyResult<Format> {
     Format::of_extension(&ending).map_or_else(|| Format::parse(&ending).or_raise(), Ok)
 }
 
-/// What files are read by.
+/// Files from which scans are read.
 enum Source {
     /// Points.
     Clouds(CloudsAt),
@@ -65,7 +65,7 @@ enum Source {
     Recorded(Box<Decoding>, Arc<Design>, Box<Scale>),
 }
 
-/// What can go wrong with a [`Source`].
+/// An error of a [`Source`].
 enum Failed {
     Record(record::Error),
     Decoding(decoding::Error),
@@ -93,7 +93,7 @@ impl Raise for Failed {
 }
 
 impl Source {
-    /// What of the file that was read last is not in its scans.
+    /// Content of the last file read that is not in its scans.
     fn left_out(&self) -> LeftOut {
         match self {
             Self::Clouds(clouds) => clouds.left_out().cloned().unwrap_or_default(),
@@ -126,9 +126,9 @@ impl Source {
 pub struct StoredScans {
     /// Gone behind the last scan, and after anything that went wrong.
     source: Arc<Mutex<Option<Source>>>,
-    /// What is read.
+    /// Names of the files.
     name: String,
-    /// What was said last of what is left out.
+    /// Content left out, by the last warning of it.
     told: Mutex<Option<LeftOut>>,
 }
 
@@ -210,7 +210,7 @@ fn clouds_at(
 /// Args:
 ///     path: A file that `Scan.save` or the program has written, its ending says the format; or the
 ///         folder of a run. It holds a single scan; of several, `load_scans` gives one after the other.
-///     topic: Of an MCAP file, the one topic whose clouds are read; all topics if left out.
+///     topic: The one topic of an MCAP file whose clouds are read; all topics if left out.
 ///     memory_limit: Bytes that the program may take; four fifths of what the machine has unless it is
 ///         given. A file with more points than fit into them is refused.
 ///
@@ -239,10 +239,9 @@ pub fn load(
 /// Reads scan after scan, in the memory of one.
 ///
 /// Args:
-///     path: A file with several scans, as `scans.mcap`; or a folder with files of one scan each, as
-///         the program leaves it behind `-o`, of which each scan is read once, from the file that
-///         keeps most.
-///     topic: Of an MCAP file, the one topic whose clouds are read; all topics if left out.
+///     path: A file with several scans, as `scans.mcap`; or a folder with files of one scan each, as the
+///         program leaves it behind `-o`. Each scan of a folder is read once, from the file that keeps most.
+///     topic: The one topic of an MCAP file whose clouds are read; all topics if left out.
 ///     memory_limit: Bytes that the program may take, as of `load`.
 ///
 /// Warns as `load` does.

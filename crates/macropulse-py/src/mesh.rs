@@ -160,7 +160,7 @@ impl Mesh {
     }
 }
 
-/// What is given, as an array of numbers of this kind.
+/// Returns `given` as an array of numbers of this kind.
 fn as_array<'py>(given: &Bound<'py, PyAny>, kind: &str) -> PyResult<Bound<'py, PyAny>> {
     given.py().import("numpy")?.call_method1("asarray", (given, kind))
 }

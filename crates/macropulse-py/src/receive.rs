@@ -28,7 +28,7 @@ use crate::{values, work};
 /// Shots are numbered up to here: more than any sensor fires in its time.
 const MOST_SHOTS: u64 = 1 << 60;
 
-/// What the dictionaries of shots, ticks and samples may hold.
+/// Keys of the dictionaries of shots, ticks and other records.
 const SHOTS: [&str; 8] =
     ["first", "owned", "fired_at_fs", "row", "column", "label", "word", "channel"];
 const TICKS: [&str; 4] = ["epoch", "tick", "channel", "amplitude"];
@@ -39,7 +39,7 @@ const TAPS: [&str; 1] = ["codes"];
 /// The columns of beats.
 const BEATS: [&str; 2] = ["frequency", "power"];
 
-/// What a receiver is given of a scan, band after band: `for shots, ticks in record(...)`, or samples.
+/// The receiver's input for one scan, band after band: `for shots, ticks in record(...)`, or samples.
 #[pyclass(frozen, module = "macropulse")]
 pub struct Records {
     design: Arc<Design>,
@@ -93,8 +93,8 @@ impl Records {
     }
 }
 
-/// What the receiver of a sensor is given of one scan: the log of its shots, and the ticks of its
-/// converters, or of a sampled sensor the samples; nothing of the scene.
+/// Records one scan as the receiver of a sensor gets it: the log of its shots, and the ticks of its
+/// converters. A sampled sensor gives samples in place of ticks. Nothing of the scene is in it.
 ///
 /// A scan comes in bands of about 3400 shots. Each has guard shots at both ends, whose light overlaps
 /// with that of its `owned` ones: they are decoded as well, and their returns dropped.
@@ -106,13 +106,12 @@ impl Records {
 ///     scan: Number of the scan, from 0.
 ///
 /// Returns:
-///     An iterator of pairs as `decode` takes them. Of the shots `first` (number of the first one, from
-///     the beginning of the first scan), `owned` (from, until: indices), and the arrays `fired_at_fs`,
-///     `row`, `column`, `label`, `word` and `channel`; of the ticks `epoch` (absolute time of tick 0,
-///     in ticks), and the arrays `tick`, `channel` (empty for a single detector) and `amplitude`
-///     (empty where not measured). Of samples, which come in place of ticks, `epoch` (absolute time of the
-///     first, in ticks), `channel` (the detectors), and `code`, an array with a row for each of them and a
-///     column for each tick; 0 is the level without light.
+///     An iterator of pairs as `decode` takes them. Shots have `first` (number of the first one, from the
+///     beginning of the first scan), `owned` (from, until: indices), and arrays: `fired_at_fs`, `row`,
+///     `column`, `label`, `word` and `channel`. Ticks have `epoch` (absolute time of tick 0, in ticks), and
+///     the arrays `tick`, `channel` (empty for a single detector) and `amplitude` (empty where not measured).
+///     Samples have `epoch` (absolute time of the first, in ticks), `channel` (the detectors), and the array
+///     `code`. It has a row for each detector and a column for each tick; 0 is the level without light.
 ///
 /// Raises:
 ///     Error: As `simulate`.
@@ -199,14 +198,14 @@ fn told_of_beats<'py>(py: Python<'py>, beats: &Beats) -> PyResult<Bound<'py, PyD
 ///
 /// Args:
 ///     sensor: A `Sensor`, the name of a ready one, or a TOML file: its code, timing and receiver.
-///     shots: The log of its shots. As a dictionary, as `record` gives it, at least `fired_at_fs`,
-///         `row` and `column`: where `label` and `word` are left out they are those that the sensor
-///         would send; without `owned` the returns of all shots are wanted; `first` and `channel` are
-///         0. Or the path of a shot log, text or binary, as `simulate --format ticks` writes it.
-///     ticks: As a dictionary, as `record` gives them, at least `tick`, ascending; without `epoch` it
-///         is 0; those of several detectors are sorted by `channel` first. Of a sampled sensor its samples,
-///         at least `code`; without `channel` its rows are all detectors in their order. A path if `shots`
-///         is one.
+///     shots: The log of its shots: a dictionary as `record` gives it, or the path of a shot log, text or
+///         binary, as `simulate --format ticks` writes it. A dictionary has at least `fired_at_fs`, `row` and
+///         `column`. Without `label` or `word`, these are the ones that the sensor would send. Without
+///         `owned`, the returns of all shots are wanted. Without `first` or `channel`, these are 0.
+///     ticks: A dictionary as `record` gives it, or a path if `shots` is one. Ticks have at least `tick`,
+///         ascending; without `epoch` it is 0. Those of several detectors are sorted by `channel` first. A
+///         sampled sensor takes samples, with at least `code`; without `channel` its rows are all detectors
+///         in their order.
 ///     environment: Sun and air, for the `intensity` of the points.
 ///
 /// Returns:
@@ -283,8 +282,8 @@ pub fn decode(
 ///     An iterator of `Scan`, without any truth.
 ///
 /// Raises:
-///     Error: If a file is of another sensor, or something in it cannot be: with the line or the
-///         byte. What stands behind a scan is found wrong when that comes up.
+///     Error: If a file is of another sensor, or something in it cannot be: with the line or the byte. An
+///         error behind a scan is raised when the reading gets there.
 ///     OSError: If a file cannot be read.
 #[pyfunction]
 #[pyo3(signature = (sensor, shots, ticks, *, environment = None))]
@@ -525,7 +524,7 @@ fn column<T: Number>(
     Ok(array.as_array().to_vec())
 }
 
-/// What `made` gives, without the warning of NumPy that a number does not fit, which is asked after.
+/// Returns the result of `made`, without NumPy's warning that a number does not fit. The caller checks that.
 fn quietly<'py, T>(
     numpy: &Bound<'py, PyModule>,
     made: impl FnOnce() -> PyResult<T>,

@@ -30,7 +30,7 @@ pub struct Scan {
     pub cloud: PointCloud,
     /// Columns that the cloud does not have as such, each computed when it is first asked for.
     computed: [OnceLock<Entries<'static>>; Attribute::ALL.len()],
-    /// What has measured it.
+    /// The sensor that has measured it.
     sensor: Option<Arc<Design>>,
     /// Names of the scene's objects.
     pub objects: Vec<String>,
@@ -39,16 +39,16 @@ pub struct Scan {
     manifest: Value,
 }
 
-/// What is known of a scan beside its points.
+/// The description of a scan beside its points.
 #[derive(Default)]
 pub struct About {
-    /// What has measured it.
+    /// The sensor that has measured it.
     pub sensor: Option<Arc<Design>>,
     /// Names of the scene's objects.
     pub objects: Vec<String>,
     /// Names of the scene's materials.
     pub materials: Vec<String>,
-    /// What is needed to repeat and to judge it; null where it was not simulated here.
+    /// The data needed to repeat and to judge it; null if it was not simulated here.
     pub manifest: Value,
 }
 
@@ -159,9 +159,9 @@ impl Scan {
     ///         file has it if left out.
     ///
     /// Returns:
-    ///     A new array of shape (rows, columns), row 0 at the top. A pixel without a return is NaN in
-    ///     real numbers and 0 in whole ones; of the truth it has that of the first surface along its
-    ///     beam, and `outcome` says there which pixels are empty (0) and which missed (4).
+    ///     A new array of shape (rows, columns), row 0 at the top. A pixel without a return is NaN in real
+    ///     numbers and 0 in whole ones. In columns of the truth it has the value of the first surface along
+    ///     its beam. There `outcome` tells the pixels that are empty (0) from those that missed (4).
     #[pyo3(signature = (name = "range", pick = None))]
     fn image<'py>(
         &self,
@@ -191,7 +191,7 @@ impl Scan {
         (self.cloud.rows, self.cloud.columns)
     }
 
-    /// Where the sensor was in the world when the scan began, m.
+    /// Position of the sensor in the world when the scan began, m.
     #[getter]
     fn position_m(&self) -> [f64; 3] {
         self.cloud.viewpoint.position
@@ -221,16 +221,16 @@ impl Scan {
         self.materials.clone()
     }
 
-    /// What is needed to repeat the scan and to judge it, with the keys of `macropulse simulate
-    /// --json`: seed, sensor, scene, environment, defaults, what is left out and was assumed, and what
-    /// was counted; None for a scan that was not simulated here.
+    /// The data needed to repeat the scan and to judge it, with the keys of `macropulse simulate --json`:
+    /// seed, sensor, scene, environment, defaults, omissions, assumptions and counts. None for a scan that
+    /// was not simulated here.
     #[getter]
     fn manifest<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         from_json(py, &self.manifest)
     }
 
-    /// Of the manifest, how the pixels came out: `outcomes`, `right_fraction` and the like; None for a
-    /// scan that was not simulated here.
+    /// Outcomes of the pixels, from the manifest: `outcomes`, `right_fraction` and the like. None for a scan
+    /// that was not simulated here.
     #[getter]
     fn score<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let own = ["outcomes", "further_outcomes", "right_fraction", "right_within_m"];
@@ -240,9 +240,9 @@ impl Scan {
         from_json(py, &some_of(named.chain(of_target.map(|key| (key, &counts[key])))))
     }
 
-    /// Of the manifest, what was counted on the way from shots to returns, the `rejects`, the
-    /// `converters`, and the seconds of processor time of each stage in `times_s`; None for a scan that
-    /// was not simulated here.
+    /// Counts on the way from shots to returns, from the manifest, with the `rejects` and the `converters`.
+    /// The seconds of processor time of each stage are in `times_s`. None for a scan that was not simulated
+    /// here.
     #[getter]
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let counts = self.manifest["counts"].as_object();
@@ -287,7 +287,7 @@ impl Scan {
     ///     path: The file; its ending says the format.
     ///     format: Name of the format, as the program has it behind `--format`, if the ending does
     ///         not say it.
-    ///     truth: Whether the truth is written beside the points.
+    ///     truth: True to write the truth beside the points.
     #[pyo3(signature = (path, *, format = None, truth = true))]
     fn save(
         slf: &Bound<'_, Self>,
@@ -353,7 +353,7 @@ fn package<'py>(py: Python<'py>, name: &str, why: &str) -> PyResult<Bound<'py, P
     })
 }
 
-/// What the numbers of `Scan.outcome` mean.
+/// Returns the names of the outcomes, in the order of the numbers of `Scan.outcome`.
 pub fn outcomes() -> Vec<&'static str> {
     Outcome::ALL.iter().map(|outcome| outcome.name()).collect()
 }

@@ -16,8 +16,8 @@ use crate::sensor::{DICTIONARY, check_readable, named};
 use crate::values::{Meshes, Reader, changes};
 use crate::work;
 
-/// Where the light goes: objects with materials and poses, the ground, sun and air, other lidars,
-/// and where the sensor stands.
+/// The world of the light: objects with materials and poses, the ground, sun and air, other lidars, and the
+/// place of the sensor.
 ///
 /// Args:
 ///     name_or_path: A ready one, as `macropulse.scenes()` lists them, or a TOML file.
@@ -33,7 +33,7 @@ use crate::work;
 pub struct Scene {
     /// As the simulator has it.
     pub scene: Arc<simulated::Scene>,
-    /// Where its files are looked for.
+    /// Folder of its files.
     folder: PathBuf,
     /// Its meshes in memory, by name.
     meshes: Meshes,
@@ -71,7 +71,7 @@ impl Scene {
         }
     }
 
-    /// Whether its text says all of it, wherever it lies: without meshes and files.
+    /// True if its text says everything, in any folder: it names no meshes and no files.
     pub fn is_self_contained(&self) -> bool {
         let table: Table = self.scene.text.parse().unwrap_or_default();
         let objects = table.get("object").and_then(toml::Value::as_array);
@@ -121,7 +121,7 @@ impl Scene {
     /// Args:
     ///     description: Keys as in a scene file, nested. The `mesh` of an object may be a
     ///         `macropulse.Mesh`. Without `version` it is 1.
-    ///     folder: Where meshes in files are looked for.
+    ///     folder: Folder in which meshes in files are looked for.
     #[classmethod]
     #[pyo3(signature = (description, folder = None))]
     fn from_dict(
@@ -140,7 +140,7 @@ impl Scene {
     ///
     /// Args:
     ///     text: TOML.
-    ///     folder: Where meshes in files are looked for.
+    ///     folder: Folder in which meshes in files are looked for.
     #[classmethod]
     #[pyo3(signature = (text, folder = None))]
     fn from_toml(
@@ -160,7 +160,7 @@ impl Scene {
     ///     vertices: Corners, shape (n, 3), m: x forward, y left, z up.
     ///     triangles: Indices of corners, shape (m, 3), from 0.
     ///     material: Name of a material of the library.
-    ///     position_m: Where the origin of the mesh stands, m.
+    ///     position_m: Position of the origin of the mesh, m.
     ///     yaw_deg: How far it is turned to the left, degrees.
     ///     ground: Material of the ground, 1.7 m below the sensor; none if left out.
     ///     environment: Sun and air: a ready one, as `macropulse.environments()` lists them.
@@ -276,7 +276,7 @@ impl Scene {
         self.scene.notes.clone()
     }
 
-    /// What is left out of what its files hold: lines, skins, animations.
+    /// Content of its files that is left out: lines, skins, animations.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.scene.warnings.clone()
@@ -318,7 +318,7 @@ impl Scene {
         Ok((make, (this.to_toml(), folder, meshes).into_pyobject(py)?))
     }
 
-    /// What `pickle` has kept.
+    /// Returns the scene that `pickle` has kept.
     #[classmethod]
     #[pyo3(name = "_restore")]
     fn restore(

@@ -14,7 +14,7 @@ use crate::error::{OrRaise, of_file, wrong};
 use crate::values::{Reader, changes};
 use crate::work;
 
-/// What dictionaries are called in messages.
+/// Name of dictionaries in messages.
 pub const DICTIONARY: &str = "the dictionary";
 
 /// A lidar: where and when it looks, the light and the code that it sends, its detector, its
@@ -104,7 +104,7 @@ impl Sensor {
     /// Args:
     ///     description: Keys as in a sensor file, nested: `{"extends": "peregrine", "name": "mine",
     ///         "scan": {"max_range_m": 40}}`.
-    ///     folder: Where files named in `extends` are looked for.
+    ///     folder: Folder in which files named in `extends` are looked for.
     #[classmethod]
     #[pyo3(signature = (description, folder = None))]
     fn from_dict(
@@ -126,7 +126,7 @@ impl Sensor {
     ///
     /// Args:
     ///     text: TOML.
-    ///     folder: Where files named in `extends` are looked for.
+    ///     folder: Folder in which files named in `extends` are looked for.
     #[classmethod]
     #[pyo3(signature = (text, folder = None))]
     fn from_toml(
@@ -186,7 +186,7 @@ impl Sensor {
         self.design.clock.tick_fs
     }
 
-    /// Whether its shots carry a code.
+    /// True if its shots carry a code.
     #[getter]
     fn is_coded(&self) -> bool {
         self.design.is_coded()
@@ -208,7 +208,7 @@ impl Sensor {
         Ok(defaults)
     }
 
-    /// What should be known of it although it is no error.
+    /// Facts about it that should be known although they are no errors.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.design.warnings.clone()
@@ -220,7 +220,7 @@ impl Sensor {
         self.design.digest()
     }
 
-    /// Where its pixels look: unit vectors in the frame of the sensor (x forward, y left, z up),
+    /// Viewing directions of its pixels: unit vectors in the frame of the sensor (x forward, y left, z up),
     /// shape (rows, columns, 3).
     fn directions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (rows, columns) = (self.design.scan.rows as usize, self.design.scan.columns as usize);

@@ -1,4 +1,4 @@
-//! What is shown of a scan in a notebook.
+//! The display of a scan in a notebook.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -6,7 +6,7 @@ use macropulse::points::PointCloud;
 use macropulse_study::view::{Layout, RangePicture};
 use serde_json::Value;
 
-/// What is `said` of a cloud, its range image, and how its pixels came out by its manifest, as HTML.
+/// Returns a cloud as HTML: the text `said`, its range image, and the outcomes of its pixels by its manifest.
 pub fn html(cloud: &PointCloud, said: &str, manifest: &Value) -> String {
     let told = escaped(said.trim_matches(['<', '>']));
     let picture = picture(cloud).map_or(String::new(), |png| {

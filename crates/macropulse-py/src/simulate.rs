@@ -68,7 +68,7 @@ impl Stage {
         ))
     }
 
-    /// What the program writes of a run of this scan.
+    /// Returns the manifest that the program writes of a run of this scan.
     fn manifest(&self, number: u64, score: &Score, tally: &Tally) -> Value {
         let warnings = record::warnings(&self.design, &self.scene);
         let run = Run {
@@ -85,7 +85,7 @@ impl Stage {
             elapsed: 0.0,
         };
         let mut manifest = manifest(&run).value();
-        // What is of a run and its files alone.
+        // These entries are of a run and its files alone.
         if let Some(entries) = manifest.as_object_mut() {
             entries.retain(|key, _| !["scans", "files"].contains(&key.as_str()));
             entries.insert("scan".to_owned(), number.into());

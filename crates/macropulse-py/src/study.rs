@@ -1,4 +1,4 @@
-//! What is asked of sensors beside scans: budgets, sweeps, scores.
+//! Studies of sensors beside scans: budgets, sweeps, scores.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -89,11 +89,11 @@ pub fn budget<'py>(
 ///         the program takes it: `"50..200:7"` seven in equal steps, `"1e6..1e10:log9"` nine in
 ///         equal ratios.
 ///     folder: Folder for the results, made if need be.
-///     changes: What is changed of all sensors and of the scene.
+///     changes: Changed values of all sensors and of the scene.
 ///     score: Names of scores, a list or a text, as `macropulse sweep --help` lists them.
 ///     seeds: Scans of each value, with a seed each.
 ///     seed: The first seed.
-///     shots: Only about so many shots of each scan, in whole bands, evenly over it.
+///     shots: Only about this number of shots of each scan, in whole bands, evenly over it.
 ///     shard: Only every n-th scan from the i-th: `"i/n"`, for several machines on one folder.
 ///     dry: Measure nothing: only check what is asked for, claim the folder, and say what is missing.
 ///     threads: Threads to compute with; 0 is one per core.
@@ -200,7 +200,8 @@ impl Names {
     }
 }
 
-/// What a sweep knows a sensor by: a name, or a file that it keeps in its folder.
+/// Returns the name of a sensor for a sweep: its own, or the path of a file that the sweep keeps in its
+/// folder.
 fn sensor_named(
     given: &Bound<'_, PyAny>,
     folder: &Path,
@@ -215,7 +216,7 @@ fn sensor_named(
     Ok(name)
 }
 
-/// What a sweep knows a scene by.
+/// Returns the name of a scene for a sweep: its own, or the path of a file as above.
 fn scene_named(
     given: &Bound<'_, PyAny>,
     folder: &Path,
@@ -259,9 +260,9 @@ fn axis(key: &Bound<'_, PyAny>, values: &Bound<'_, PyAny>) -> PyResult<Axis> {
 ///     scan: A `Scan` with the truth.
 ///
 /// Returns:
-///     A dictionary: `outcomes` of the pixels, `further_outcomes` of second and later returns,
-///     `right_fraction` of the pixels with a surface in the gate, edges left out, and of the right points `count`,
-///     `mean_m` and `deviation_m` of the range error.
+///     A dictionary: `outcomes` of the pixels, `further_outcomes` of second and later returns, and
+///     `right_fraction` of the pixels with a surface in the gate, edges left out. The range error of the
+///     right points has `count`, `mean_m` and `deviation_m`.
 ///
 /// Raises:
 ///     Error: If the scan has no truth.

@@ -1,4 +1,4 @@
-//! What is written in Python, as values of sensor and scene files, and back.
+//! Python values as values of sensor and scene files, and back.
 
 use macropulse::design::{WITH, WITHOUT};
 use macropulse::environment::Environment;
@@ -136,9 +136,9 @@ pub fn environment(given: Option<&Bound<'_, PyAny>>) -> PyResult<Environment> {
     Environment::read(&value).or_raise()
 }
 
-/// Changes of a sensor or scene: dotted keys and values, as the program takes them behind `--set`,
-/// `--with` and `--without`. A dictionary of a sensor is as many dotted keys; one of a scene, whose keys
-/// stand behind `scene:` or `environment` or are those `of_scene` alone, is a table.
+/// Changes of a sensor or scene: dotted keys and values, as the program takes them behind `--set`, `--with`
+/// and `--without`. A dictionary of a sensor becomes a dotted key for each of its values. A dictionary of a
+/// scene stays a table: its key begins with `scene:` or `environment`, or all keys are `of_scene`.
 ///
 /// # Errors
 /// As [`Reader::value`]; and if a mesh is among the values.
@@ -186,7 +186,7 @@ fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// What a program prints as JSON, as Python has it: `null` is `None`.
+/// Converts JSON that a program prints into Python objects: `null` is `None`.
 ///
 /// # Errors
 /// If Python has no memory left.

@@ -25,17 +25,17 @@ const MOST_THREADS: usize = 1024;
 /// The variable by which rayon is asked for threads where `threads` is 0.
 const RAYON_THREADS: &str = "RAYON_NUM_THREADS";
 
-/// Whether to stop.
+/// Flag that tells work to stop.
 #[derive(Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Whether it was said.
+    /// Returns true if the work is to stop.
     pub fn is_raised(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// The same for what goes on until it is broken off.
+    /// Returns the same as the control flow of a loop.
     pub fn flow(&self) -> ControlFlow<()> {
         if self.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
@@ -49,7 +49,7 @@ struct Pool {
     pool: Arc<ThreadPool>,
 }
 
-/// Those of the last call, for the next one.
+/// Threads of the last call, kept for the next one.
 static LAST: Mutex<Option<Pool>> = Mutex::new(None);
 
 fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
@@ -82,7 +82,7 @@ fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
     Ok(pool)
 }
 
-/// Does `work` on so many `threads`, 0 for one per core, while other threads of Python run.
+/// Does `work` on `threads` threads, 0 for one per core, while other threads of Python run.
 ///
 /// # Errors
 /// `KeyboardInterrupt`, or whatever the handler of a signal raises; then `work` has been told to

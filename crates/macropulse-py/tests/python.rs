@@ -20,8 +20,9 @@ fn cargo() -> Command {
     cargo
 }
 
-/// The program of this source, which is to give the same bytes. It is built as for one of its own tests, which in a
-/// run of all tests it has been: alone, with fewer features of what it is made of, all that would be compiled again.
+/// The program of this source, which must give the same bytes. It is built for one of its own tests, as in a
+/// run of all tests. In a build of it alone, its dependencies would have fewer features and be compiled
+/// again.
 fn program() -> PathBuf {
     let build =
         ["test", "--quiet", "--no-run", "--workspace", "--test", "commands", "--target-dir"];
@@ -32,7 +33,7 @@ fn program() -> PathBuf {
 /// An empty folder of this name.
 fn emptied(name: &str) -> PathBuf {
     let folder = target().unwrap().join("python").join(name);
-    // What an older source has left.
+    // An older source may have left files.
     let _ = std::fs::remove_dir_all(&folder);
     folder
 }
@@ -96,7 +97,7 @@ fn installed(interpreter: &Path) -> &'static Path {
     })
 }
 
-/// What pytest says of `tests`, all of which pass.
+/// Runs `tests`, which must pass, and returns the output of pytest.
 fn passed(interpreter: &Path, site: &Path, tests: &[&str]) -> String {
     let printed = call(
         Command::new(interpreter)
@@ -112,8 +113,8 @@ fn passed(interpreter: &Path, site: &Path, tests: &[&str]) -> String {
     printed
 }
 
-/// What a newcomer has: a fresh environment in which nothing is installed but the package, with what
-/// it asks for itself. The ten lines are those of the guide.
+/// A newcomer has a fresh environment with nothing but the package and its dependencies. The ten lines are
+/// those of the guide.
 #[test]
 fn a_newcomer_has_a_cloud_after_ten_lines() {
     let any = python(&here().join("tests/requirements.txt")).unwrap();
@@ -130,7 +131,7 @@ fn a_newcomer_has_a_cloud_after_ten_lines() {
     let printed = call(Command::new(&interpreter).current_dir(&elsewhere).arg(lines)).unwrap();
     let scan = printed.lines().next().unwrap();
     assert!(scan.starts_with("<macropulse.Scan 0 of kim-park-2016-fixed: "), "{printed}");
-    // What the guide shows of the same lines.
+    // The guide shows the same line.
     let guide = std::fs::read_to_string(here().join("../../docs/guide/python.md")).unwrap();
     assert!(guide.lines().any(|line| line == scan), "{printed}");
     assert!(elsewhere.join("car.pcd").exists());

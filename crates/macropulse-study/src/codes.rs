@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 /// How many send at once where errors are told; the paper has 25 shots in flight.
 pub const USERS: [u32; 3] = [10, 16, 25];
 
-/// What a family was found to be like, as an object; what is not known is null.
+/// Returns the properties of a family as an object; unknown ones are null.
 pub fn told(of: &Comparison) -> Value {
     let errors = USERS.into_iter().filter_map(|users| {
         let access = of.users(users)?;

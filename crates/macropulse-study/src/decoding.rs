@@ -26,7 +26,7 @@ pub enum Error {
     Unreadable {
         /// The file as it was named.
         name: String,
-        /// What the operating system said.
+        /// Error of the operating system.
         cause: io::Error,
     },
     /// A file says something that cannot be.
@@ -68,7 +68,7 @@ pub enum Error {
     },
 }
 
-/// What the shots, and the ticks, samples or histograms, are called in messages.
+/// Names of the shots and of their record (ticks, samples or histograms) in messages.
 #[derive(Debug, Clone)]
 pub struct Names([String; 2]);
 
@@ -79,13 +79,13 @@ impl fmt::Display for Names {
     }
 }
 
-/// Where shots, ticks or samples come from.
+/// Source of shots or of their record.
 pub struct Input {
-    /// What it is called in messages.
+    /// Name in messages.
     pub name: String,
-    /// What is read.
+    /// Bytes to read.
     pub bytes: Box<dyn Read + Send>,
-    /// Whether it comes as it is made: then it is decoded as it comes.
+    /// True if the input comes while it is recorded; each band is then decoded as it comes.
     pub is_live: bool,
 }
 
@@ -108,11 +108,11 @@ impl Input {
 pub struct Band {
     /// Its shots.
     pub log: ShotLog,
-    /// What the converters gave.
+    /// Record of the converters.
     pub given: Given,
-    /// What the receiver made of both.
+    /// Returns that the receiver decoded from both.
     pub returns: Returns,
-    /// The points of that.
+    /// Points of the returns.
     pub piece: Piece,
 }
 
@@ -141,8 +141,7 @@ pub struct Decoding {
 }
 
 impl Decoding {
-    /// The decoding of `shots` and of their record that were recorded of them, `record`, all of the
-    /// sensor `design`.
+    /// Starts to decode `shots` and their `record`, both of the sensor `design`.
     ///
     /// # Errors
     /// [`Error::Invalid`] if one is no such file, [`Error::OfAnother`] if it is of another sensor.
@@ -220,7 +219,7 @@ impl Decoding {
             }
             let Some(band) = self.waiting.pop_front() else { break };
             if watch(&band)?.is_break() {
-                // What comes next would be the rest of this scan.
+                // The next bands would be the rest of this scan.
                 (self.waiting, self.is_over) = (VecDeque::new(), true);
                 return Ok(None);
             }

@@ -1,5 +1,5 @@
-//! What is done with the simulator: the experiment of Kim & Park (2016), sweeps, records of runs,
-//! link budgets, and the pictures, charts and pages that show them.
+//! Uses of the simulator: the experiment of Kim & Park (2016), sweeps, records of runs, link budgets, and the
+//! pictures, charts and pages that show them.
 
 #![cfg_attr(test, allow(missing_docs))]
 #![warn(clippy::print_stdout, clippy::print_stderr)]

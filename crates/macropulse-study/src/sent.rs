@@ -1,4 +1,4 @@
-//! What is sent to a pixel, mark by mark.
+//! The macropulse that is sent to a pixel, mark by mark.
 
 use macropulse::design::Design;
 use macropulse::emit::{Shot, most_scans, shot_of_pixel};
@@ -53,7 +53,7 @@ pub struct Macropulse<'a> {
 }
 
 impl<'a> Macropulse<'a> {
-    /// What `design` sends to the pixel of this row and column in a scan.
+    /// Returns the macropulse that `design` sends to the pixel of this row and column in a scan.
     ///
     /// # Errors
     /// If it has no such pixel or scan.

@@ -253,7 +253,7 @@ fn the_page_sorts_statements_as_they_are_judged() {
     assert!(listed == wanted, "{remedy}; {differ:?}");
 }
 
-/// What is planted for one part of Fig. 7 names it.
+/// A fault planted in one part of Fig. 7 is reported with the name of the part.
 #[test]
 fn a_block_that_stands_with_the_wrong_part_is_named() {
     let mut measured = MEASURED.clone();

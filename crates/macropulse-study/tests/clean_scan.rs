@@ -1,4 +1,4 @@
-//! What each receiver makes of the clean car scene, and how many samples fall on the car.
+//! Results of each receiver on the clean car scene, and the number of samples that fall on the car.
 //!
 //! The detector sees every mark and nothing else, unless a test says otherwise; one seed.
 #![allow(clippy::unwrap_used)]

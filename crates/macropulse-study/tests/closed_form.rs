@@ -187,12 +187,12 @@ fn shapes(yaw_deg: f64, shift: [f64; 3]) -> Scene {
     Scene::from_toml(&text, "shapes", Path::new("")).unwrap()
 }
 
-/// What a ray from the sensor meets first of [`SHAPES`].
+/// Returns the distance at which a ray from the sensor meets the nearest of [`SHAPES`].
 fn nearest_shape([x, y, z]: [f64; 3]) -> Option<f64> {
     let along = 30.0 * x + 2.0 * y;
     let square = along * along - (30.0_f64.powi(2) + 2.0_f64.powi(2) - 1.5 * 1.5);
     let sphere = (square >= 0.0 && along > 0.0).then(|| along - square.max(0.0).sqrt());
-    // Of the box, which stands to the right, the sensor sees the front and the left side.
+    // The box stands to the right, so the sensor sees its front and its left side.
     let front =
         (x > 0.0).then(|| 40.0 / x).filter(|t| (t * y + 4.0).abs() <= 1.5 && (t * z).abs() <= 2.0);
     let side =

@@ -11,8 +11,8 @@ use macropulse::sim::Watch;
 use macropulse_study::budget::{Figures, usual};
 use macropulse_study::designs::{Found, Requirements, Search, make_room};
 
-/// A corner of the field of the paper, so often that the shots of three beams follow each other as soon as
-/// those of fifteen do in its whole field: a search of 20 s.
+/// A corner of the field of the paper, scanned so often that three beams have the shot interval of fifteen
+/// beams in the whole field. A search takes 20 s.
 const SMALL: &str = r#"
 version = 1
 name = "small"
@@ -94,10 +94,10 @@ fn what_is_wrong_in_a_file_is_said_with_its_place() {
     }
 }
 
-/// Thirty beams have 2.1 µs between the shots of one, in which light comes back from 300 m, fifteen 1.06,
-/// enough for 150 m. One that does not wait needs fewer. What is found keeps to class 1 and finds what is
-/// wanted, and the budget says so, too; the same again is read from its files, to the bit. Control: at ten times
-/// the range nothing does.
+/// With thirty beams the shots of one are 2.1 µs apart, enough for light from 300 m. With fifteen they are
+/// 1.06 µs apart, enough for 150 m. A lidar that does not wait needs fewer beams. Each lidar found keeps to
+/// class 1 and meets the requirements, and its budget agrees. A second search reads its files and finds the
+/// same, to the bit. Control: nothing is found at ten times the range.
 #[test]
 fn what_is_found_does_and_is_found_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,8 +128,8 @@ fn what_is_found_does_and_is_found_again() {
     assert_eq!(found(&far, folder.path(), 1).best, [None, None]);
 }
 
-/// Echoes of 16 by 64 pixels, 20 times a second, are back from 40 m a hundred times over before the next shot: one
-/// channel that waits does, and a code is told to gain nothing.
+/// At 16 by 64 pixels, 20 times a second, an echo from 40 m could come back a hundred times before the next
+/// shot. One channel that waits is enough, and the report says that a code gains nothing.
 #[test]
 fn an_easy_task_needs_no_code() {
     let easy = [
@@ -149,8 +149,8 @@ fn an_easy_task_needs_no_code() {
     assert!(text.contains("none of the parts allowed: a code gains nothing: "), "{text}");
 }
 
-/// The next search into a folder takes the results of the last one away before it begins, and nothing else: a file
-/// that no search has written, or that was changed since, is refused and stays.
+/// The next search into a folder first removes the results of the last one, and nothing else. A file under
+/// the name of a result that no search has written, or that was changed since, is refused and stays.
 #[test]
 fn a_search_removes_what_a_search_has_written_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
@@ -194,8 +194,9 @@ fn beams_for_which_no_word_fits_are_skipped_and_listed() {
     assert!(found.text().contains("inalas, 4 marks, beams 1: words of"), "{}", found.text());
 }
 
-/// Sixteen rows of sixty-four pixels to 40 m: eyes would allow some 3 µJ a shot, of which the stray light shows for
-/// longer than the receiver is blanked, so that every shot returned its end. Blanked for longer it is an easy task.
+/// Sixteen rows of sixty-four pixels to 40 m. Eye safety would allow some 3 µJ a shot. The stray light of
+/// such a shot outlasts the blanking of the receiver, so every shot would return its tail. With longer
+/// blanking the task is easy.
 #[test]
 fn no_more_light_is_sent_than_the_receiver_bears() {
     let easy = "version = 1\nname = \"easy\"\n[wanted]\nrows = 16\ncolumns = 64\n\

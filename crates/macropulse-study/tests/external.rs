@@ -33,7 +33,7 @@ fn every_published_figure_is_met_and_would_not_be_if_ours_were_another() {
     }
 }
 
-/// What was asked for is among them.
+/// All topics and sources that were asked for are among the figures.
 #[test]
 fn no_topic_and_no_source_is_left_out() {
     for (topic, source, least) in [

@@ -1,6 +1,6 @@
 //! The examples of docs/examples, with the meshes by others that they are written for.
 //!
-//! The meshes are no part of the repository. Where they are absent, a test says so and passes.
+//! The meshes are no part of the repository. If they are absent, a test says so and passes.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::fs;
@@ -141,9 +141,10 @@ fn a_hatchback_in_inches_stands_30_m_ahead() {
     assert_on_level(&road, 0.0, seen.tolerance());
 }
 
-/// A flash of 32 rows over 7.5 degrees meets the road 31.6 m away at the nearest, from 2 m above it with
-/// a cosine of 0.0634: as much light as 0.88 % square on, 59 photons, with 100 needed and 13 of noise. Of
-/// the thousand rays that meet it, 0.1 points are expected; four or more come with α = 4e-6 (Poisson).
+/// A flash of 32 rows over 7.5 degrees, 2 m above the road, meets it no nearer than at 31.6 m, with a cosine
+/// of 0.0634. The road returns the light of a target of 0.88 % square on: 59 photons, with 100 needed and 13
+/// of noise. The thousand rays that meet the road give 0.1 expected points. Four or more come with α = 4e-6
+/// (Poisson).
 #[track_caller]
 fn assert_too_dark_for(flash: &Design, road: &[Point]) {
     let lowest = (7.5_f64 / 2.0 - 7.5 / 64.0).to_radians();

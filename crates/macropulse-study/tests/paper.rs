@@ -108,7 +108,7 @@ mod payload {
         assert_eq!(codebook.payload().unwrap().bits(), 13);
         assert_eq!(codebook.chips(), 10_933);
         assert_relative_eq!(DERIVED.macropulse, 27.3325e-9, max_relative = 1e-12);
-        // What is printed would be this many chips.
+        // The printed length would be this many chips.
         let chips = 27.4875e-9 / s_from_fs(DESIGN.emission.coding().chip_fs);
         assert_relative_eq!(chips, 10_995.0, max_relative = 1e-12);
         reported("payload", Holds, &["13 bits"]);
@@ -333,8 +333,8 @@ mod light {
         assert_relative_eq!(limits.continuous(), 1.00e-3, max_relative = 3e-3);
         // 198 nJ in every pixel would be 4.8 W.
         assert_relative_eq!(single / DERIVED.pixel_period, 4.8, max_relative = 0.01);
-        // 79 pixels cross a pupil of 7 mm at the horizon, in less than the 5 µs that count as one;
-        // in the outer lines they stand closer by the cosine of their elevation, up to 12°.
+        // 79 pixels cross a pupil of 7 mm at the horizon, in less than the 5 µs that count as one pulse. In
+        // the outer lines they stand closer by the cosine of their elevation, up to 12°.
         let strict = honest(true);
         let line = strict.eye_limits().iter().find(|limit| limit.rule == Rule::Group).unwrap();
         assert_relative_eq!(line.shots, 79.0 / 11_f64.to_radians().cos(), max_relative = 0.01);

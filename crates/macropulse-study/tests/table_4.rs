@@ -71,8 +71,8 @@ fn lowest_on_car(distance: u32) -> f64 {
     heights.fold(f64::INFINITY, f64::min)
 }
 
-/// Peregrine sees tyres partly at 30 m and wholly at 50 m: so it stands higher than the lower
-/// edge of its field rises in 30 m, and by less than a tyre of 0.6 m.
+/// Peregrine sees tyres partly at 30 m and wholly at 50 m. It thus stands higher than the lower edge of its
+/// field drops over 30 m, and the difference is less than a tyre of 0.6 m.
 #[test]
 fn tyres_are_cut_off_for_a_sensor_between_1_97_and_2_57_m() {
     let edge = 30.0 * (7.5_f64 / 2.0).to_radians().tan();

@@ -1,8 +1,8 @@
 //! Means of tests: Python with packages, a browser, lists of sources.
 //!
-//! Files that Macropulse writes are read in its tests by readers that others wrote, most of them
-//! Python packages. [`python`] makes an environment with the packages of a requirements file, once,
-//! in the target folder, and gives its interpreter.
+//! The tests read files that Macropulse writes with readers that others wrote, most of them Python packages.
+//! [`python`] makes an environment with the packages of a requirements file, once, in the target folder, and
+//! returns its interpreter.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -60,10 +60,10 @@ pub fn chromium() -> Result<Option<PathBuf>, String> {
     }
 }
 
-/// Runs `command`, and gives what it printed.
+/// Runs `command` and returns its output.
 ///
 /// # Errors
-/// What it printed, if it could not be started or failed.
+/// A sentence, if it could not be started; with its output, if it failed.
 pub fn call(command: &mut Command) -> Result<String, String> {
     let output = command.output().map_err(|why| format!("{command:?} did not start: {why}"))?;
     let printed =
@@ -92,8 +92,7 @@ fn on_path(name: &str) -> Option<PathBuf> {
     std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.is_file())
 }
 
-/// The folder that cargo builds into, of which the calling test program is one: it lies in
-/// `<target>/<profile>/deps`.
+/// Returns the folder that cargo builds into. The calling test program lies in `<target>/<profile>/deps`.
 ///
 /// # Errors
 /// A sentence, if the program lies elsewhere.

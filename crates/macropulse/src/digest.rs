@@ -1,10 +1,11 @@
 //! The hash by which a manifest says which sensor and scene it was.
 
-/// What is gathered before it is hashed: numbers one by one would cost more than their hash.
+/// Bytes that are gathered before they are hashed: to hash numbers one by one would cost more than the hash
+/// itself.
 const BLOCK: usize = 1 << 16;
 
-/// The BLAKE3 hash \[BLAKE3\] under way, of which 128 bits are kept: the same on every machine and
-/// run, and no two inputs are known, or can be made, that share it.
+/// The BLAKE3 hash \[BLAKE3\] under way. 128 bits of it are kept. It is the same on every machine and run,
+/// and no two inputs that share it are known, or can be made.
 #[derive(Debug, Clone)]
 pub struct Digest {
     hasher: blake3::Hasher,

@@ -32,7 +32,7 @@ pub mod points;
 pub mod score;
 pub mod formats;
 
-/// What both ends of the link speak, and the receivers.
+/// The language of both ends of the link, and the receivers.
 pub use macropulse_codec as codec;
 
 pub mod sim;

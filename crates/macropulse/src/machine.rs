@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The memory that the program may take in all, bytes, where the system tells: what is built in, or
-/// less where the program or a group of programs that it belongs to has a limit of its own.
+/// Returns the memory that the program may take in all, bytes, if the system tells it. It is the built-in
+/// memory, or less if the program or a group of programs that it belongs to has a limit of its own.
 pub fn memory() -> Option<u64> {
     let built_in = kilobytes(&fs::read_to_string("/proc/meminfo").ok()?, "MemTotal:")?;
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
@@ -20,8 +20,8 @@ fn kilobytes(text: &str, key: &str) -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// What is left of the address space that the program may have (`ulimit -v`), without what is in it but
-/// in no memory: stacks of threads, mapped files.
+/// Returns the address space that the program may have (`ulimit -v`), less the part in use that is in no
+/// memory: stacks of threads, mapped files.
 fn address_space() -> Option<u64> {
     let limit = most_address_space(&fs::read_to_string("/proc/self/limits").ok()?)?;
     let status = fs::read_to_string("/proc/self/status").ok()?;

@@ -1,8 +1,8 @@
 //! The memory that a run takes, estimated before it is spent.
 //!
-//! What grows is counted: code words, triangles, pixels, and of a band, on each thread, its shots, its
-//! ticks and their events. Factors stand for what is kept of each at once; they are measured, and
-//! `docs/hardening.md` has the estimates beside the memory that runs have taken.
+//! The parts that grow are counted: code words, triangles, pixels and, for the band on each thread, its
+//! shots, its ticks and their events. Factors stand for the bytes that each of them takes at once; they are
+//! measured. `docs/hardening.md` has the estimates beside the memory that runs have taken.
 
 use crate::channel::{Error, Operating};
 use crate::design::{Design, Effect, Modulation, Readout};

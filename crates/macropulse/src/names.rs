@@ -5,16 +5,16 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// The one of `known` that `typed` was probably meant to be, if any is near enough: a few letters
-/// apart, or one the beginning of the other, as `yaw` and `yaw_degrees` of `yaw_deg`. Capitals do
-/// not matter.
+/// Returns the name in `known` that `typed` was probably meant to be, if any is near enough. Near names are a
+/// few letters apart, or one is the beginning of the other, as `yaw` and `yaw_degrees` of `yaw_deg`. Capitals
+/// do not matter.
 pub fn nearest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let typed = typed.to_lowercase();
     known
         .into_iter()
         .map(|name| (strsim::damerau_levenshtein(&typed, name), name))
         .filter(|(distance, name)| {
-            // Of a short word few letters are left if some are changed.
+            // A short word has few letters left if some are changed.
             let most = match name.chars().count() {
                 0..=2 => 0,
                 3 | 4 => 1,

@@ -14,7 +14,7 @@ pub const LONGEST_TEXT: u64 = 16 << 20;
 /// some hundred bytes each, however short it is.
 const MOST_VALUES: usize = 1 << 21;
 
-/// What comes out of a file, or of a pipe.
+/// The bytes of a file, or of a pipe.
 pub type Stream = Chain<Cursor<Vec<u8>>, File>;
 
 /// The file at `path`, which must be one and have `most` bytes at most.
@@ -67,32 +67,32 @@ pub fn check_values(text: &str) -> Result<(), String> {
     }
 }
 
-/// What comes out of the file at `path`, or of the pipe there if a program writes to it.
+/// Opens the file at `path`, or the pipe there if a program writes to it.
 ///
 /// # Errors
-/// What the system says; or, in a sentence, that it is a device, or a pipe to which nothing writes.
+/// The error of the system; or, in a sentence, that it is a device, or a pipe to which nothing writes.
 pub fn stream(path: &Path) -> io::Result<Stream> {
     let (file, about) = opened(path)?;
     let first = if about.is_file() { Vec::new() } else { pipe::awaited(&file)? };
     Ok(Cursor::new(first).chain(file))
 }
 
-/// Whether both paths lead to one file, through whatever links.
+/// Returns true if both paths lead to one file, through whatever links.
 pub fn is_same(one: &Path, other: &Path) -> bool {
     pipe::is_same(one, other)
 }
 
-/// Whether bytes written to `path` go through it: to a device that takes them one by one, into a pipe, or
-/// to a standard stream.
+/// Returns true if bytes written to `path` go through it: to a device that takes them one by one, into a
+/// pipe, or to a standard stream.
 pub fn is_written_through(path: &Path) -> bool {
     stream_number(path).is_some()
         || std::fs::metadata(path).is_ok_and(|about| pipe::takes_bytes(&about))
 }
 
-/// What bytes written to `path` go through, if it is of that kind.
+/// Opens the device, pipe or standard stream at `path`, if bytes written to it go through.
 ///
 /// # Errors
-/// What the system says; or, in a sentence, that nothing reads from the pipe.
+/// The error of the system; or, in a sentence, that nothing reads from the pipe.
 pub(crate) fn written_through(path: &Path) -> io::Result<Option<File>> {
     match stream_number(path) {
         Some(number) => pipe::standard_stream(number),
@@ -101,7 +101,7 @@ pub(crate) fn written_through(path: &Path) -> io::Result<Option<File>> {
     }
 }
 
-/// Whether `path` names standard output.
+/// Returns true if `path` names standard output.
 pub fn is_standard_output(path: &Path) -> bool {
     stream_number(path) == Some(1)
 }

@@ -11,7 +11,7 @@ use rand::rand_core::TryRng;
 
 use crate::kernels::{GROUP, philox};
 
-/// What random numbers are drawn for. Each stage has numbers of its own.
+/// Purposes of random numbers. Each stage has numbers of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Is this mark seen? Indexed by pulse train.
@@ -37,7 +37,7 @@ pub enum Stage {
     Amplifier = 10,
     /// How late does a comparator answer? Indexed by the sample at which it does, parts by channel.
     Comparator = 11,
-    /// What stands in a scene that is made up. Indexed by row of pixels.
+    /// The objects of a scene that is made up. Indexed by row of pixels.
     Scenery = 12,
     /// How bright an echo is with speckle. Indexed by shot and ray.
     Speckle = 13,
@@ -58,9 +58,9 @@ pub enum Stage {
 /// The counter at which a run of random numbers begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Address {
-    /// What the numbers are for.
+    /// Purpose of the numbers.
     pub(crate) stage: Stage,
-    /// Of which shot or window.
+    /// Index of the shot or window.
     pub(crate) index: u64,
     /// Which part of it, below 2²⁴.
     pub(crate) part: u32,
@@ -189,7 +189,7 @@ mod tests {
             numbers(7, Stage::Marks, 12, 1),
         ];
         for other in others {
-            // Of a hundred numbers of 32 bits that are drawn at random hardly one is the same.
+            // Hardly one in a hundred numbers of 32 bits that are drawn at random is the same.
             assert!(owned.iter().zip(&other).filter(|(a, b)| a == b).count() < 2);
         }
     }

@@ -52,7 +52,7 @@ pub(crate) fn explained(words: impl IntoIterator<Item = (&'static str, &'static 
     json_schema!({ "oneOf": words.collect::<Vec<_>>() })
 }
 
-/// What must stand where `node` is the schema, in words: its kind, its limits, its choices.
+/// Returns in words what a value with the schema `node` must be: its kind, its limits, its choices.
 pub(crate) fn wanted(node: &Value) -> Option<String> {
     if let Some(choices) = choices(node) {
         let choices: Vec<String> = choices.iter().filter_map(choice).collect();
@@ -84,7 +84,7 @@ pub(crate) fn wanted(node: &Value) -> Option<String> {
     })
 }
 
-/// The schemas of which a value must fit one.
+/// Returns the schemas among which a value must fit one.
 fn choices(node: &Value) -> Option<&[Value]> {
     let choices = ["oneOf", "anyOf"].into_iter().find_map(|kind| node.get(kind)?.as_array());
     choices.filter(|_| node.get("properties").is_none()).map(Vec::as_slice)
@@ -133,7 +133,7 @@ fn homes_below(node: &Value, key: &str, path: &str, found: &mut Vec<String>) {
     }
 }
 
-/// What Rust says and TOML or its editors do not know: absence as a value, lines of comments.
+/// Removes what Rust says and TOML or its editors do not know: absence as a value, lines of comments.
 fn tidied(schema: &mut Schema) {
     let Some(keywords) = schema.as_object_mut() else { return };
     if keywords.get("default").is_some_and(Value::is_null) {
@@ -175,7 +175,7 @@ mod tests {
     use serde::Deserialize;
     use serde_json::json;
 
-    /// What it is for.
+    /// A file of the tests.
     #[derive(Deserialize, JsonSchema)]
     #[serde(deny_unknown_fields)]
     #[expect(dead_code, reason = "read by the schema alone")]

@@ -419,8 +419,8 @@ pub struct Tally {
     pub by_number: [u64; MOST_RETURNS as usize],
     /// Rejects by kind, in the order of [`Reject::ALL`].
     pub rejects: [u64; Reject::ALL.len()],
-    /// Seconds of processor time spent in each of [`Tally::STAGES`], summed over threads: the time of all of
-    /// them together is that of the processor, their shares of it are those of the wall clock.
+    /// Seconds of processor time spent in each of [`Tally::STAGES`], summed over threads. The sum of all
+    /// stages is the time of the processor. Their shares of it are their shares of the wall clock.
     pub seconds: [f64; POINTS + 1],
 }
 

@@ -1,5 +1,4 @@
-//! What is said of a file that is wrong, in words for whoever typed it: parsers and systems say it in
-//! theirs.
+//! Messages about faulty files, in words for whoever typed them: parsers and systems use words of their own.
 
 use std::io;
 
@@ -36,13 +35,14 @@ pub fn unwritable(error: &io::Error) -> String {
         io::ErrorKind::StorageFull => "the disk is full",
         io::ErrorKind::QuotaExceeded => "your share of the disk is used up",
         io::ErrorKind::FileTooLarge => "a file may not be as large as this here",
-        // What the system says, without its number.
+        // The words of the system, without its number.
         _ => return error.to_string().split(" (os error").next().unwrap_or_default().to_owned(),
     };
     known.to_owned()
 }
 
-/// Whether an `error` in writing is that of the machine, and not of whoever typed the name of a place.
+/// Returns true if an `error` in writing is that of the machine, and not of whoever typed the name of a
+/// place.
 pub fn is_of_the_machine(error: &io::Error) -> bool {
     !matches!(
         error.kind(),
@@ -85,7 +85,7 @@ pub fn syntax(text: &str, error: &toml::de::Error) -> String {
     format!("is not TOML: {remedy}")
 }
 
-/// What is said of a `word` that is not among those that are `known`.
+/// Returns the message for a `word` that is not among those that are `known`.
 pub fn unknown(what: &str, word: &str, known: &[&str]) -> String {
     let known: Vec<&str> = known.iter().copied().filter(|name| *name != word).collect();
     match nearest(word, known.iter().copied()) {

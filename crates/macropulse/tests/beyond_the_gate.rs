@@ -1,5 +1,5 @@
-//! Light is not gated: a wall beyond the range gate sends back as much as one within it. What that
-//! means is up to the receiver.
+//! Light is not gated: a wall beyond the range gate sends back as much as one within it. The receiver decides
+//! what that means.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -26,8 +26,8 @@ fn middle(design: &Design, scene: &Scene) -> Scan {
     sim::scan_part(design, scene, 1, &bands).unwrap()
 }
 
-/// The sensors of the paper sees marks of white at 150 m with 0.99. At 161 m it is 0.98, at 140 m
-/// 0.995: the walls make the same events but for a percent, and a few more shots are in flight.
+/// The sensor of the paper sees marks of white at 150 m with 0.99. At 161 m it is 0.98, at 140 m 0.995: the
+/// walls make the same events but for a percent, and a few more shots are in flight.
 #[test]
 fn a_wall_beyond_the_gate_makes_as_many_events_as_one_within() {
     let design = Design::open("kim-park-2016-fixed", &[]).unwrap();

@@ -48,10 +48,11 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// H0: a wall is found, and as precisely, as forecast, with both windows; with two ramps it moves, and with a single one it
-/// stands at four places within a bin, so that its beats lie anywhere in theirs. N = 15 360 pixels for each place and radius,
-/// seed 5; a share may differ by 0.02 or 4.9 deviations (α = 1e-6), a precision by 15 %, as few faint echoes make much of it.
-/// Control: forecasts for three quarters of the light, and half the bandwidth.
+/// H0: with both windows, a wall is found as often and as precisely as forecast. With two ramps it moves.
+/// With a single one it stands at four places within a bin, so its beats lie anywhere in theirs. N = 15 360
+/// pixels for each place and radius, seed 5. A share may differ by 0.02 or 4.9 deviations (α = 1e-6). A
+/// precision may differ by 15 %, as few faint echoes make much of it. Control: forecasts for three quarters
+/// of the light, and half the bandwidth.
 #[test]
 fn walls_are_found_as_forecast() {
     let two = [(60.0, 0.02), (100.0, 0.02), (120.0, 0.15), (190.0, 0.9), (20.0, 0.5)];

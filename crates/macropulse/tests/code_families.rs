@@ -168,7 +168,7 @@ fn an_m_sequence_in_balance_is_dark_off_its_peak() {
     }
 }
 
-/// {−t, −1, t − 2} with t = 2^⌊(n+2)/2⌋ + 1, every value of which occurs.
+/// {−t, −1, t − 2} with t = 2^⌊(n+2)/2⌋ + 1; each of these values occurs.
 #[test]
 fn gold_words_meet_in_three_values() {
     for (degree, t) in [(5, 9), (6, 17), (7, 17)] {

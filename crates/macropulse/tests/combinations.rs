@@ -62,7 +62,8 @@ fn section() -> &'static str {
     section.split("\n### ").next().unwrap()
 }
 
-/// What the first column of the table names: the detectors of pulses, and what stands behind a photodiode.
+/// Returns the names in the first column of the table: the detectors of pulses, and what stands behind a
+/// photodiode.
 fn detectors() -> Vec<&'static str> {
     let others = Detector::NAMES
         .iter()
@@ -195,11 +196,11 @@ fn every_combination_is_what_the_table_says() {
     }
 }
 
-/// H0: returns come as often as the forecast says, of a wall by day that is seen by about half. With a code at least a third
-/// as often: a thorough receiver believes bare short words less often than is forecast where shots are so far apart that
-/// each is judged before those behind it. And no pixel is found more often alone, in a flash, than where neighbours tell
-/// where to look. N = 2048 shots, seed 1: a share is known to 0.011, and three of those are granted. Control: four times
-/// the light is told from it.
+/// H0: returns of a wall by day come as often as the forecast says, from about half of the pixels. With a
+/// code they come at least a third as often. A thorough receiver believes bare short words less often than is
+/// forecast if shots are so far apart that each is judged before those behind it. And no pixel is found more
+/// often alone, in a flash, than with neighbours that tell where to look. N = 2048 shots, seed 1: a share is
+/// known to 0.011, and three of those are granted. Control: four times the light is told from it.
 #[test]
 fn the_forecast_holds_for_every_combination() {
     let day = Environment::named("clear-day").unwrap();

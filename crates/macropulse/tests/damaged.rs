@@ -13,8 +13,8 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 
 const READABLE: [&str; 9] = ["pcd", "ply", "las", "laz", "e57", "npy", "csv", "kitti", "mcap"];
 
-/// More memory than sound readers take for a file of some ten kilobytes, kB: the image of a list may have
-/// as many pixels as a sensor, 2²⁵ of them, with 25 bytes each and the truth.
+/// More memory than sound readers take for a file of some ten kilobytes, kB. The image of a list may have all
+/// pixels of a sensor, 2²⁵, with 25 bytes each and the truth.
 const MOST_MEMORY: usize = 2 << 20;
 
 /// One file is read at a time: the memory is that of the process.

@@ -38,7 +38,7 @@ fn errors(cloud: &PointCloud, range: f64) -> (f64, f64) {
     ((errors.iter().map(|error| (error - mean).powi(2)).sum::<f64>() / n).sqrt(), mean)
 }
 
-/// Of the rays that meet a road of 0.109 so far away, the share that is seen.
+/// Returns the share that is seen of the rays that meet a road of 0.109 at these distances, m.
 fn seen(cloud: &PointCloud, from: f32, to: f32) -> f64 {
     let truth = &cloud.truth.pixels;
     let met = |at: &usize| {

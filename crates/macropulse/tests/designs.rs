@@ -25,7 +25,7 @@ fn room(range: f64, reflectance: f64) -> Scene {
     ))
 }
 
-/// Every so many bands of a scan.
+/// Measures one band of a scan in `every` bands.
 fn measure(design: &Design, scene: &Scene, every: usize) -> Scan {
     let part: Vec<Band> = short_bands(design, 0).step_by(every).collect();
     sim::scan_part(design, scene, 1, &part).unwrap()

@@ -16,7 +16,7 @@ use macropulse::random::Chance;
 use macropulse::scene::Scene;
 use macropulse::tdc::{self, Wanted};
 
-/// What a receiver is given of a band of the second scan of `scene`.
+/// Returns the input of a receiver for a band of the second scan of `scene`.
 fn given(design: &Design, scene: &str, band: usize) -> (ShotLog, Ticks) {
     let scene = Scene::open(scene).unwrap();
     let operating = Operating::of(design, &Environment::vacuum_dark()).unwrap();
@@ -42,8 +42,8 @@ fn set(receiver: &Receiver, change: impl FnOnce(&mut Correlation, &mut Effort)) 
     receiver
 }
 
-/// Shots of which `all` gives a return and `some` none, and those of which both give returns, but not the same ones to a
-/// tick.
+/// Counts shots with a return in `all` and none in `some`, and shots with returns in both, but not the same
+/// ones to a tick.
 fn lost_and_moved(some: &Returns, all: &Returns) -> [usize; 2] {
     const TICK: f64 = 2.5e-12;
     let of_shot = |returns: &Returns, shot: u32| -> Vec<f64> {
@@ -63,9 +63,9 @@ fn lost_and_moved(some: &Returns, all: &Returns) -> [usize; 2] {
     counts
 }
 
-/// Asserts that a quick receiver loses no larger `share` of the shots that a thorough one finds in N = 1696 of a band,
-/// and finds at most one in 100 elsewhere, as declared, seed 20160913. Control: one that accepts false returns as rarely
-/// as `blind` does not.
+/// Asserts that a quick receiver loses no larger `share` of the shots that a thorough one finds. It finds at
+/// most one in 100 elsewhere, as declared. N = 1696 shots of a band, seed 20160913. Control: one that accepts
+/// false returns as rarely as `blind` does not.
 fn assert_few_differ(scene: &str, band: usize, share: f64, blind: f64) {
     let design = Design::open("kim-park-2016", &[]).unwrap();
     let (log, ticks) = given(&design, scene, band);
@@ -83,22 +83,22 @@ fn assert_few_differ(scene: &str, band: usize, share: f64, blind: f64) {
     assert!(differ(&set(&design.receiver, |it, _| it.false_alarm = blind)).is_some());
 }
 
-/// Ground 91 or 95 m away is so faint that a thorough receiver finds four shots in ten of it. Of a whole scan of 240
-/// bands nine are so faint.
+/// Ground 91 or 95 m away is so faint that a thorough receiver finds four shots in ten of it. Nine bands are
+/// so faint in a whole scan of 240.
 #[test]
 fn far_ground_is_found_that_few_shots_see() {
     assert_few_differ("car-50m", 132, 0.25, 1e-12);
 }
 
-/// Of a wall behind a pane somewhat more is seen than of the pane, along twenty shots, and both are faint.
+/// Along twenty shots, somewhat more is seen of a wall behind a pane than of the pane. Both are faint.
 #[test]
 fn a_wall_behind_a_pane_is_found_where_both_are_faint() {
     assert_few_differ("street", 127, 0.0, 1e-60);
 }
 
-/// N = 1696 shots without noise, and as many as declared, seed 20160913: no shot is refused for its label, and
-/// a quick receiver gives the ranges that a thorough one gives, but for two faint shots. Control: a receiver that
-/// believes nothing faint does not.
+/// N = 1696 shots without noise, and the same ones of the sensor as declared, seed 20160913. No shot is
+/// refused for its label. A quick receiver gives the ranges that a thorough one gives, but for two faint
+/// shots. Control: a receiver that believes nothing faint does not.
 #[test]
 fn light_of_another_surface_does_not_pass_for_another_label() {
     let perfect = [

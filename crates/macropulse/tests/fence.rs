@@ -1,5 +1,5 @@
-//! Points where there is nothing: sky between pickets, where light of several shots makes all marks of
-//! one that has met nothing, and a surface too dark to be seen well.
+//! Points where there is nothing: in the sky between pickets, and at a surface too dark to be seen well. In
+//! that sky, light of several shots makes all marks of a shot that has met nothing.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::fmt::Write;
@@ -29,7 +29,7 @@ fn scene(text: &str) -> Scene {
     Scene::from_toml(&text, "scene", Path::new("")).unwrap()
 }
 
-/// Pickets at `range` m, each twelve of the `columns` wide, with as many columns of sky between them.
+/// Returns pickets at `range` m, each twelve of the `columns` wide, with twelve columns of sky between them.
 fn fence(range: f64, (columns, degrees): (u32, f64)) -> Scene {
     let column = (degrees / f64::from(columns)).to_radians();
     let width = 2.0 * range * (6.0 * column).tan();
@@ -68,7 +68,7 @@ fn dark() -> Scene {
     scene("[[object]]\nshape.sphere.radius_m = 149.9\nmaterial = \"dark\"\n")
 }
 
-/// Some stretches of a scan, one in so many.
+/// Returns the score of one stretch of a scan in `every` stretches.
 fn scan(sensor: &str, keys: &[(&str, &str)], (scene, every): (&Scene, usize)) -> Score {
     let keys: Vec<(String, String)> =
         keys.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
@@ -93,13 +93,13 @@ fn strays(score: &Score) -> [u64; 2] {
 }
 
 /// H0: no more than one shot in ten thousand gives a point where nothing is. N = 4000 to 8000 shots of each
-/// sensor at each fence, half of them without a target, and as many at the dark sphere, seed 77. Six points or
-/// more come with α = 2e-4 or less (Poisson). Whole scans had none at the fences, 1 at the sphere with
-/// kim-park-2016-fixed, 16 with coded-360. Control: with short words of three marks and every second false
-/// return accepted there are many.
+/// sensor at each fence, half of them without a target, and the same number at the dark sphere, seed 77. Six
+/// points or more come with α = 2e-4 or less (Poisson). Whole scans had none at the fences, 1 at the sphere
+/// with kim-park-2016-fixed, 16 with coded-360. Control: with short words of three marks and every second
+/// false return accepted there are many.
 ///
-/// The light of all shots of bipolar-gold lies in step, so of it more is asked: none of more than 40 000
-/// shots, which bounds the share from above by 1 − 0.025^(1/N) = 9.2e-5 (Clopper–Pearson, 95 % two-sided).
+/// The light of all shots of bipolar-gold lies in step, so more is asked of it: none of more than 40 000
+/// shots. This bounds the share from above by 1 − 0.025^(1/N) = 9.2e-5 (Clopper–Pearson, 95 % two-sided).
 #[test]
 fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
     for (sensor, columns, degrees) in SENSORS {
@@ -130,10 +130,10 @@ fn nothing_is_seen_between_pickets_or_beside_a_dark_wall() {
     assert!(strays > 12, "{strays}");
 }
 
-/// H0: no more than one empty pixel in 20 000 shows light of posts behind the gate, as far away as a word is sent again,
-/// so that the light of each comes early in the gate of a shot in the same word. N > 80 000 shots, one fifth of a scan,
-/// seed 77, with a gate of 150 m; more than 13 come with α = 1e-4 (Poisson, mean 4.1). Control: without labels there are
-/// more.
+/// H0: no more than one empty pixel in 20 000 shows light of posts behind the gate. The posts are as far away
+/// as a word is sent again, so that the light of each comes early in the gate of a shot in the same word. N >
+/// 80 000 shots, one fifth of a scan, seed 77, with a gate of 150 m; more than 13 come with α = 1e-4
+/// (Poisson, mean 4.1). Control: without labels there are more.
 #[test]
 fn posts_behind_the_gate_are_not_seen_in_front_of_it() {
     let scene = posts(171.85);
@@ -145,9 +145,9 @@ fn posts_behind_the_gate_are_not_seen_in_front_of_it() {
     assert!(unlabelled > 13, "{unlabelled}");
 }
 
-/// H0: where half of the shots are seen, no more than one in 10 000 takes light of another for its own. Of
-/// coded-360, thorough, at 105 m by night, a quarter of a scan, N > 70 000, seed 77; more than 18 come with
-/// α = 1e-4 (Poisson, mean 7). Control: where every second false return is accepted there are more.
+/// H0: where half of the shots are seen, no more than one in 10 000 takes light of another for its own. The
+/// sensor is coded-360, thorough, at 105 m by night. A quarter of a scan, N > 70 000, seed 77; more than 18
+/// come with α = 1e-4 (Poisson, mean 7). Control: where every second false return is accepted there are more.
 #[test]
 fn the_light_of_one_shot_is_not_taken_for_that_of_two() {
     let night = "version = 1\nenvironment = \"night\"\n[[material]]\nname = \"paint\"\n\

@@ -82,8 +82,9 @@ fn a_wall_is_found_where_it_is() {
     assert!((range("coates") - 2.0).abs() < 0.01 && range("none") < 1.95);
 }
 
-/// The share of the pixels of `design` that see a sphere of `reflectance` at `radius` metres in `around`, within half a
-/// metre of it, and the standard deviation of their ranges.
+/// Returns the share of the pixels of `design` that see a sphere, within half a metre of it, and the standard
+/// deviation of their ranges. The sphere of `reflectance` and of `radius`, m, stands in the environment
+/// `around`.
 fn seen(design: &Design, around: &str, (reflectance, radius): (f64, f64)) -> (f64, f64) {
     let text = format!(
         "version = 1\nenvironment = \"{around}\"\n[[material]]\nname = \"paint\"\ndiffuse = {reflectance:?}\n\
@@ -133,7 +134,7 @@ fn what_is_found_is_what_was_forecast() {
     }
 }
 
-/// What comes after the last bin is not found with any light, and what has no forecast says so.
+/// An echo after the last bin is not found with any light. A detector without a forecast says so.
 #[test]
 fn a_forecast_ends_with_the_histogram() {
     let design = flash(BURST).unwrap();
@@ -147,7 +148,7 @@ fn a_forecast_ends_with_the_histogram() {
     assert!(told.contains("no forecast of optical crosstalk between cells"), "{told}");
 }
 
-/// What lies beyond c·T/2 is folded by it: a wall at 12 m is seen at 3.006 m.
+/// A range beyond c·T/2 is folded by it: a wall at 12 m is seen at 3.006 m.
 #[test]
 fn a_wall_beyond_the_interval_is_folded() {
     let cloud = scanned(&flash(BURST).unwrap(), &sphere(12.0, ""));

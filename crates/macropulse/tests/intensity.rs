@@ -1,8 +1,8 @@
 //! Intensity is reflectance: what every ready sensor says of a wall that it sees square on.
 //!
-//! Where more than half of the returns are saturated the detector cannot tell how bright the wall is,
-//! and says no more than it is at least. Elsewhere the median over all returns, saturated ones above
-//! all others, is the reflectance of the wall.
+//! If more than half of the returns are saturated, the detector cannot tell how bright the wall is, and gives
+//! only a lower bound. Elsewhere the median over all returns, saturated ones above all others, is the
+//! reflectance of the wall.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -18,17 +18,17 @@ const SEED: u64 = 11;
 /// How far from square on a wall is seen, degrees; the cosine is taken off.
 const SQUARE_ON: f32 = 5.0;
 
-/// As far where a tick is so short that the footprint of a beam farther off fills several of them, of
-/// which the receiver looks at one or two.
+/// The same for a tick so short that the footprint of a beam farther off fills several ticks. The receiver
+/// looks at one or two of these.
 const SHARPLY_SQUARE_ON: f32 = 0.3;
 
-/// Of coded sensors, whose scans take long, so many rows in the middle of a scan; and where only a few
-/// columns are looked at.
+/// Rows that are measured in the middle of a scan of coded sensors, whose scans take long. The second number
+/// is for sensors that are looked at in a few columns only.
 const ROWS: [u32; 2] = [1, 6];
 
-/// A sensor, the sun it works in, and reflectance and range of a wall that is so dark that even a counter
-/// of marks can tell how dark; none of eight marks across a threshold, between nothing and all of
-/// which lies a third of the light.
+/// A sensor, the sun it works in, and reflectance and range of a wall that is so dark that even a counter of
+/// marks can tell how dark. `None` for eight marks across a threshold: between none and all of them lies a
+/// third of the light.
 type Case = (&'static str, &'static str, Option<[f64; 2]>);
 
 /// Ready sensors, those that differ in the order of their lasers alone left out.
@@ -47,7 +47,7 @@ const SENSORS: [Case; 12] = [
     ("rosette-mid-40", "clear-day", Some([0.1, 50.0])),
 ];
 
-/// What a sensor says of a wall.
+/// Result of a sensor for a wall.
 #[derive(Debug)]
 struct Told {
     returns: usize,
@@ -78,7 +78,8 @@ fn told(sensor: &str, environment: &str, [reflectance, range]: [f64; 2]) -> Told
     of_cloud(&cloud, if is_sharp { SHARPLY_SQUARE_ON } else { SQUARE_ON })
 }
 
-/// The bands that have part in so many rows in the middle of the first scan, of shots row by row.
+/// Returns the bands that have part in this number of rows in the middle of the first scan, of shots row by
+/// row.
 fn middle(design: &Design, rows: u32) -> Vec<Band> {
     let first = (design.scan.rows - rows) / 2;
     let columns = u64::from(design.scan.columns);
@@ -106,8 +107,8 @@ fn of_cloud(cloud: &PointCloud, within_deg: f32) -> Told {
     Told { returns, saturated, median: ranked[returns / 2].1 }
 }
 
-/// H0: the median is the reflectance of the wall to 5 %, where the detector can tell. Seed 11; N as
-/// printed, 51 at least. Where it cannot, the bound holds. Returns what is wrong.
+/// H0: the median is the reflectance of the wall to 5 %, where the detector can tell. Seed 11; N as printed,
+/// 51 at least. If it cannot, the bound holds. Returns what is wrong.
 fn wrong((sensor, environment, dark): Case) -> Vec<String> {
     let rated = Design::open(sensor, &[]).unwrap().scan.rated_range;
     let white = [10.0, 25.0, 50.0, 100.0, 140.0].into_iter().filter(|range| *range <= rated);

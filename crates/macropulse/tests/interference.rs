@@ -48,7 +48,7 @@ fn at_lines(design: &Design, scan: u64, lines: [u64; 4]) -> Vec<Band> {
     part
 }
 
-/// What the coded lidar measures in four bands, N = 6784 shots, of scan number `scan`.
+/// Returns four bands, N = 6784 shots, of scan number `scan` of the coded lidar.
 fn part(scenario_name: &str, keys: &[(&str, &str)], scan: u64) -> Scan {
     let design = open("kim-park-2016-fixed", keys);
     sim::scan_part(&design, &scenario(scenario_name), SEED, &chosen(&design, scan)).unwrap()
@@ -58,8 +58,8 @@ fn score(scenario_name: &str, keys: &[(&str, &str)], scan: u64) -> Score {
     part(scenario_name, keys, scan).score
 }
 
-/// H0 of all scenarios: what is asserted holds whatever the chance. N = 6784 shots, of which 1284
-/// look at the sky; one seed. What must not happen in the others happens in phase.
+/// H0 of all scenarios: what is asserted holds whatever the chance. N = 6784 shots; 1284 of them look at the
+/// sky; one seed. The scenario in phase shows what must not happen in the others.
 #[test]
 fn without_others_nothing_changes() {
     let alone = part("none", &[], 0);
@@ -119,9 +119,9 @@ fn an_identical_lidar_in_phase_deceives_every_receiver() {
     }
 }
 
-/// With half of the words two shots in flight often have the same one, and light of one lies upon the marks of the
-/// other: a faint shot takes none that fits another as well. N = 6784 shots, seed 1; one in 100 is wrong at most.
-/// Control: with two words more are.
+/// With half of the words, two shots in flight often have the same one, and light of one overlaps the marks
+/// of the other. A faint shot takes none that fits another just as well. N = 6784 shots, seed 1; one in 100
+/// is wrong at most. Control: with two words more are.
 #[test]
 fn light_that_fits_another_shot_is_not_taken() {
     let wrong = |keys: &[(&str, &str)]| {
@@ -187,8 +187,8 @@ fn the_ghosts_of_a_drifting_lidar_walk_past() {
     assert!((median - expected).abs() < 1.5e-3, "{median} m, not {expected}");
 }
 
-/// Each detector of a spinning head looks at its own pixel for less than a microsecond in 0.2 s:
-/// of 4.9 million shots of the other a few dozen are seen at all.
+/// Each detector of a spinning head looks at its own pixel for less than a microsecond in 0.2 s. A few dozen
+/// of 4.9 million shots of the other are seen at all.
 #[test]
 fn a_spinning_lidar_hardly_sees_the_others() {
     let design = open("hdl-64e", &[]);
@@ -290,7 +290,7 @@ fn single_pulses_make_ghosts_as_often_as_theory_says() {
         let pixels = (0..40).flat_map(|row| (0..200).map(move |column| (row, column)));
         let chance = |(row, column)| {
             let [x, ..] = design.directions().of(row, column);
-            // What is within 0.35 m of the truth is near, not wrong.
+            // A return within 0.35 m of the truth is near, not wrong.
             ghost_of_single_pulses(rate, design.scan.min_range, 50.0 / x - 0.35)
         };
         pixels.map(chance).sum::<f64>() / shots

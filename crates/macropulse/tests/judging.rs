@@ -57,8 +57,8 @@ fn returns(hits: &Hits, owned: std::ops::Range<usize>) -> Returns {
     returns
 }
 
-/// A shot with one surface and one return is judged as one with several is, of which all but one are
-/// out of reach. Negative control: one more within reach changes how returns come out.
+/// A shot with one surface and one return is judged as one with several surfaces is, all but one of them out
+/// of reach. Negative control: one more within reach changes how returns come out.
 #[test]
 fn one_surface_is_judged_as_several_are() {
     let design = Design::open("kim-park-2016", &[]).unwrap();
@@ -87,10 +87,10 @@ fn one_surface_is_judged_as_several_are() {
     assert!(all.points_on_target > 50 && different > 10, "{all:?}, {different} different");
 }
 
-/// How the return of the pixel beside a plate came out, and that of the pixel after it: each shot of
-/// a line answers from the plate, 30 m ahead, which ends so many `reaches` beside the middle of the
-/// first of the two pixels. A reach is how far from the middle of a macropulse its outermost part is
-/// sent: 7/16 of what the mirror moves during it. A wall may stand `behind`.
+/// Returns the outcomes of the pixel beside a plate and of the pixel after it. Each shot of a line answers
+/// from the plate, 30 m ahead. The plate ends this number of `reaches` beside the middle of the first of the
+/// two pixels. A reach is how far from the middle of a macropulse its outermost part is sent: 7/16 of what
+/// the mirror moves during it. A wall may stand `behind`.
 fn beside_a_plate(reaches: f64, behind: &str) -> [Outcome; 2] {
     let footprint = ("without".to_owned(), "footprint".to_owned());
     let design = Design::open("coded-practical", &[footprint]).unwrap();

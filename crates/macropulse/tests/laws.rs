@@ -305,7 +305,7 @@ mod multiple_access {
         ((u64::from(chance.next_u32()) * u64::from(n)) >> 32) as u32
     }
 
-    /// What the receiver does with marks that fall on the same chip.
+    /// The way in which the receiver counts marks that fall on the same chip.
     #[derive(Clone, Copy)]
     enum Limiter {
         /// Counts them all.
@@ -314,9 +314,9 @@ mod multiple_access {
         Hard,
     }
 
-    /// Sends a dark bit `trials` times in one of `words` drawn at random, while all the others
-    /// carry a bit that is lit once in `one_in`, each at a random cyclic shift. Counts how often
-    /// the marks found at the places of the word reach its weight.
+    /// Sends a dark bit `trials` times in one of `words` drawn at random. All the others carry a bit that is
+    /// lit once in `one_in`, each at a random cyclic shift. Counts how often the marks found at the places of
+    /// the word reach its weight.
     fn mistaken_dark_bits(
         (words, one_in): (&[CodeWord], u32),
         limiter: Limiter,
@@ -347,7 +347,7 @@ mod multiple_access {
         mistaken
     }
 
-    /// The same where an interferer has bits of its own, of which two are seen one after the other, each
+    /// The same for interferers with bits of their own. Two bits of each are seen one after the other, each
     /// lit half of the time; every mark counts.
     fn mistaken_by_bits_that_begin_anywhere(words: &[CodeWord], trials: u32, seed: u64) -> u32 {
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
@@ -395,9 +395,9 @@ mod multiple_access {
         (words, access)
     }
 
-    /// N = 200 000 dark bits in each of four experiments; two-sided alpha = 0.001 for all four
-    /// together, 3.66 standard deviations for each. What the formula lacks (see the last test)
-    /// is below one standard deviation here. Negative control: the Gaussian formula is rejected.
+    /// N = 200 000 dark bits in each of four experiments; two-sided alpha = 0.001 for all four together, 3.66
+    /// standard deviations for each. The shortfall of the formula (see the last test) is below one standard
+    /// deviation here. Negative control: the Gaussian formula is rejected.
     #[test]
     fn real_words_err_as_often_as_the_soft_formula_says() {
         const TRIALS: u32 = 200_000;
@@ -413,8 +413,8 @@ mod multiple_access {
     }
 
     /// N = 100 000 dark bits of p = 5 with four others, seed 6; two-sided alpha = 0.001, 3.29 standard
-    /// deviations, of which what the formula lacks is one. 0.0091 is computed apart. Negative control: the
-    /// formula for bits that begin with ours is rejected.
+    /// deviations. The shortfall of the formula is one of these. 0.0091 is computed apart. Negative control:
+    /// the formula for bits that begin with ours is rejected.
     #[test]
     fn bits_that_begin_anywhere_err_less_often() {
         const TRIALS: u32 = 100_000;
@@ -462,11 +462,10 @@ mod multiple_access {
         }
     }
 
-    /// Half of the bits being dark, an experiment would take 10⁹ of them to see the hard curve at
-    /// p = 7 and 11. Where the others send lit bits only, each meets the word twice as often and
-    /// errors are many: N = 1 000 000 dark bits, seeds 6 and 7. The formula says up to a third too
-    /// much, as above; the bounds are more than four standard deviations away. Negative control:
-    /// the soft formula is far outside.
+    /// As half of the bits are dark, an experiment would take 10⁹ of them to see the hard curve at p = 7 or
+    /// p = 11. If the others send lit bits only, each meets the word twice as often and errors are many: N =
+    /// 1 000 000 dark bits, seeds 6 and 7. The formula says up to a third too much, as above; the bounds are
+    /// more than four standard deviations away. Negative control: the soft formula is far outside.
     #[test]
     fn lit_interferers_fill_a_limited_word_as_the_formula_says() {
         const TRIALS: u32 = 1_000_000;

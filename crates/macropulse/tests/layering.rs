@@ -329,7 +329,7 @@ fn bare(text: &str) -> String {
     code
 }
 
-/// What follows the literal whose inside begins `rest`.
+/// Returns the text after the literal whose inside begins `rest`.
 fn after_string(rest: &str) -> &str {
     let mut escaped = false;
     for (at, letter) in rest.char_indices() {
@@ -418,13 +418,13 @@ fn modules_named(text: &str, own: &str, known: &[String]) -> BTreeSet<String> {
     all.map(home).collect()
 }
 
-/// What `text`, a source of the module of `rule`, names without leave.
+/// Returns the modules that `text`, a source of the module of `rule`, names without leave.
 fn breaches(text: &str, rule: &Rule, known: &[String]) -> Vec<String> {
     let named = modules_named(text, rule.module, known);
     named.into_iter().filter(|name| !rule.may_name.contains(&name.as_str())).collect()
 }
 
-/// Where the speed of light is named beside `units`, and for what.
+/// Files beside `units` that name the speed of light, and their purpose.
 const OF_LIGHT: [(&str, &str); 3] = [
     ("macropulse/src/channel/interferers.rs", "one way from an interferer"),
     ("macropulse/src/channel/speckle.rs", "wave numbers"),

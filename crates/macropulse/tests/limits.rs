@@ -258,7 +258,7 @@ fn keys_drawn_together_are_refused_or_work() {
     assert!(worked > 30, "{worked}");
 }
 
-/// What was accepted once and then called a fault of the program.
+/// Values that were accepted once and then called a fault of the program.
 #[test]
 fn what_a_receiver_refuses_is_refused_with_its_key() {
     let told = |sensor: &str, set: &[(&str, &str)]| {

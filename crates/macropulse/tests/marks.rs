@@ -81,9 +81,9 @@ proptest! {
     }
 }
 
-/// Light of all ranges at once: a macropulse that begins later may have its first mark earlier, where
-/// the bits of the other one are dark to begin with, and fall among marks of one before both. Of bands
-/// as these it happens in about every other, of 40 tried.
+/// Light of all ranges at once. If the bits of a macropulse are dark to begin with, one that begins later may
+/// have its first mark earlier, and fall among marks of one before both. This happens in about every other
+/// band of this kind, of 40 tried.
 #[test]
 fn ticks_of_marks_at_random_ranges_are_those_of_their_events() {
     let design = sensor("kim-park-2016", &COUNTING, &[]);
@@ -102,9 +102,9 @@ fn ticks_of_marks_at_random_ranges_are_those_of_their_events() {
     }
 }
 
-/// A macropulse of column 1 is dark for its first nine bits, 19 ns. One of column 840 ends meanwhile,
-/// and one of column 841 begins meanwhile, with its first mark before that end or behind it: both are
-/// moved in steps of 0.7 ns, through all overlaps of the three.
+/// A macropulse of column 1 is dark for its first nine bits, 19 ns. One of column 840 ends meanwhile, and one
+/// of column 841 begins meanwhile, with its first mark before that end or behind it. Both are moved in steps
+/// of 0.7 ns, through all overlaps of the three.
 #[test]
 fn ticks_come_in_order_where_a_dark_beginning_is_overtaken() {
     let design = sensor("kim-park-2016", &COUNTING, &[]);
@@ -178,8 +178,8 @@ fn marks_are_not_all_there_is_where_anything_else_is() {
     assert!(photons(&complement, f64::INFINITY).is_none());
 }
 
-/// The echoes of a shot are told apart by a number of 16 bits, and its light by one for each slice of a
-/// micropulse: echoes beyond that are detected all the same.
+/// The echoes of a shot are told apart by a number of 16 bits. Its light takes one number for each slice of a
+/// micropulse. Echoes beyond that are detected all the same.
 #[test]
 fn a_shot_may_have_echoes_without_number() {
     // Its micropulses are followed in 13 slices, so that 5042 echoes are too many to be told apart.

@@ -11,10 +11,10 @@ use macropulse::scene::Scene;
 /// Rows and columns of squares, each of two triangles.
 const SQUARES: u32 = 500;
 
-/// Bytes that a triangle of an STL file may take while it is loaded. As it is read, it has three
-/// corners of its own (72), their indices (12) and its material (2); then, beside that, it is laid
-/// out in the world, with corners (72), material and object (4): 162. Later the corners are put into
-/// another order (twice 72), beside three lists of indices (12). A tenth is for the hierarchy.
+/// Bytes that a triangle of an STL file may take while it is loaded. As it is read, it has three corners of
+/// its own (72), their indices (12) and its material (2). Beside that, it is laid out in the world, with
+/// corners (72), material and object (4): 162. Later the corners are put into another order (twice 72),
+/// beside three lists of indices (12). A tenth is for the hierarchy.
 const BYTES: usize = 162 + 16;
 
 /// Bytes for all that does not grow with the triangles, the pages of the program above all: 9 MB

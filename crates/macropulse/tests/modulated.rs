@@ -71,7 +71,7 @@ fn walls_are_found_as_forecast() {
             let deviation = (forecast.pd * (1.0 - forecast.pd) / 4800.0).sqrt();
             let place = format!("{reflectance} at {radius} m, {name}: {forecast:?}, found {found}");
             assert!((forecast.pd - found).abs() < (4.9 * deviation).max(0.02), "{place}");
-            // Of faint echoes not all are near enough to count.
+            // Not all faint echoes are near enough to count.
             let Some(precision) = forecast.precision.filter(|sigma| 5.0 * sigma < 0.1) else {
                 continue;
             };

@@ -1,4 +1,4 @@
-//! What moves, seen by sensors that stand still, and the other way round.
+//! Objects that move, seen by sensors that stand still, and the other way round.
 #![allow(clippy::unwrap_used)]
 
 use macropulse::codec::ShotLog;
@@ -169,7 +169,7 @@ fn a_thing_that_turns_shows_its_other_side() {
     assert!(scene.cast_at(&beside, FS_PER_S, (0.0, 99.0)).unwrap().range < 9.0 + 0.2);
 }
 
-/// What a log of one shot, fired straight ahead at this time, meets.
+/// Returns the hits of a log of one shot, fired straight ahead at this time.
 fn ahead_at(scene: &Scene, time_fs: i64) -> Hits {
     let design = Design::open("peregrine", &[]).unwrap();
     let log =
@@ -232,8 +232,8 @@ fn a_car_that_stands_in_a_fleet_moves_alone() {
     assert_eq!(met(20.0, 3), "cars");
 }
 
-/// Known answer: of a car that goes from 10 to 30 m ahead in 2 s, pitched and rolled at both ends, and back
-/// faster, the roof is met where it is at each time; each pose of it rests on the ground.
+/// Known answer: a car goes from 10 to 30 m ahead in 2 s, and back faster, where it ends pitched and rolled.
+/// Its roof is met where it is at each time. Each pose of it rests on the ground.
 #[test]
 fn a_car_on_a_path_is_met_where_it_is() {
     let scene = scene(
@@ -276,7 +276,7 @@ fn the_digest_knows_what_moves() {
         scene(&format!("{object}{keys}[sensor]\nposition_m = [0, 0, 2]\n{sensor}")).digest()
     };
     let still = digest("", "");
-    // What does not move by its keys stands still.
+    // A thing whose keys give it no motion stands still.
     assert_eq!(still, digest("velocity_m_s = [0, 0, 0]\nturn_rate_deg_s = 0\n", ""));
     let moving = [
         digest("velocity_m_s = [1, 0, 0]\n", ""),
@@ -328,7 +328,7 @@ fn a_wrong_motion_is_refused_at_its_place() {
     assert!(message.starts_with("a.toml:5:16: velocity_m_s must be three finite"), "{message}");
 }
 
-/// The bytes of a scan of the spinning sensor on a pool of so many threads.
+/// Returns the bytes of a scan of the spinning sensor on a pool of `threads` threads.
 fn bytes(scene: &Scene, threads: usize) -> Vec<u8> {
     let design = Design::open("hdl-64e", &[]).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -31,12 +31,12 @@ fn sensor(name: &str, set: &[(&str, &str)]) -> Design {
     Design::open(name, &set.iter().map(owned).collect::<Vec<_>>()).unwrap()
 }
 
-/// What follows from a sensor where there is neither air nor sunlight.
+/// Returns the operating state of a sensor with neither air nor sunlight around it.
 fn in_the_dark(design: &Design) -> Operating {
     Operating::of(design, &Environment::vacuum_dark()).unwrap()
 }
 
-/// Probability that a mark of so many photons makes an event, where nothing else falls on the
+/// Returns the probability that a mark of this number of photons makes an event, if nothing else falls on the
 /// detector.
 fn mark_pd(design: &Design, photons: f64) -> f64 {
     let background = in_the_dark(design).background;
@@ -59,7 +59,7 @@ fn measure(design: &Design, scene: &Scene, seed: u64, count: usize) -> Scan {
     sim::scan_part(design, scene, seed, &part).unwrap()
 }
 
-/// Whether `count` of `trials` may well have come with probability `share`: neither tail of the
+/// Returns true if `count` of `trials` may well have come with probability `share`: neither tail of the
 /// binomial distribution beyond it is below half of [`ALPHA`].
 fn agrees(count: u64, trials: u64, share: f64) -> bool {
     if share <= 0.0 || share >= 1.0 {
@@ -100,7 +100,7 @@ fn detected(scan: &Scan) -> (u64, u64) {
 /// Places, range and reflectance, in an environment: N = 1694 lit shots in each case, seed 1. Control: the forecast
 /// for twice the light is rejected wherever detection is neither certain nor hopeless. Returns in how many cases.
 fn paper_fails_as_predicted(environment: &str, places: &[(f64, f64)]) -> usize {
-    // Where the light is faint a sidelobe may win, up to 0.3 m farther: not beyond the gate.
+    // If the light is faint, a sidelobe may win, up to 0.3 m farther: not beyond the gate.
     let keys = [("receiver.effort", "\"thorough\""), ("scan.gate_beyond_m", "1.0")];
     let design = sensor("kim-park-2016-physical", &keys);
     let sky = Environment::named(environment).unwrap();
@@ -155,9 +155,10 @@ fn in_dense_light_the_forecast_is_right_to_a_tenth() {
     assert!(forecaster.with_background(0.0).forecast(1.0, 90.5).pd > 0.99);
 }
 
-/// N > 5000 shots of each of three sensors on a wall all around by night, at reflectances of which the forecast is 0.1,
-/// 0.4, 0.7 and 0.95, seed 5: the thorough receiver finds as many, to 0.02 and 4 % of the light, on which it depends
-/// steeply. Control: of a tenth more light it does not, in half of the cases.
+/// N > 5000 shots of each of three sensors on a wall all around by night, seed 5. At reflectances with a
+/// forecast of 0.1, 0.4, 0.7 and 0.95, the thorough receiver finds that share. It does so to 0.02 and 4 % of
+/// the light, on which the share depends steeply. Control: it does not find the forecast for a tenth more
+/// light, in half of the cases.
 #[test]
 fn a_thorough_receiver_finds_what_is_forecast() {
     let night = Environment::named("night").unwrap();
@@ -218,7 +219,7 @@ fn marks_are_seen_as_predicted_over_four_decades_of_light() {
     ];
     for lines in detectors {
         let design = with_detector(lines);
-        // A linear detector takes as many photons as its threshold.
+        // A linear detector takes photons in proportion to its threshold.
         let noise = design.detector.model().noise(0.0);
         let unit = noise.map_or(1.0, |noise| noise.threshold / 3.0);
         let (mut told_apart, mut some) = (0, 0);
@@ -299,7 +300,7 @@ fn a_small_bank_loses_what_erlang_says() {
             lost += ticks.lost;
         }
         let mut bank = design.bank().unwrap();
-        // Losses come in runs: so many independent ones are in the count.
+        // Losses come in runs: a tenth of the count is independent.
         let independent = events / 10;
         assert!(
             agrees(lost / 10, independent, bank_loss(&bank, 1e9)),
@@ -311,8 +312,8 @@ fn a_small_bank_loses_what_erlang_says() {
     }
 }
 
-/// N = 5000 pixels on a wall, which meet all phases of a tick; seed 1. A standard deviation from so
-/// many is known to 1 %. Control: rounding alone, and jitter alone, are rejected.
+/// N = 5000 pixels on a wall, which meet all phases of a tick; seed 1. A standard deviation from 5000 is
+/// known to 1 %. Control: rounding alone, and jitter alone, are rejected.
 #[test]
 fn range_is_as_precise_as_predicted() {
     let wall = Scene::open("wall").unwrap();
@@ -356,7 +357,7 @@ fn range_is_as_precise_as_predicted() {
         let predicted = forecaster.forecast(0.5, range).precision.unwrap();
         assert!((measured / predicted - 1.0).abs() < 0.05, "{name}: {measured}, {predicted}");
     }
-    // Where jitter is wide, the receiver's choice of a window costs it some of what is predicted.
+    // If jitter is wide, the receiver's choice of a window costs it some of what is predicted.
     let (measured, predicted) = spread("2.5");
     assert!((0.95..1.3).contains(&(measured / predicted)), "{measured}, {predicted}");
 }
@@ -438,9 +439,9 @@ fn chain(shots: u32, dead: f64, rate: f64, pd: f64) -> f64 {
     f64::from(hits) / f64::from(shots)
 }
 
-/// N = 100 000 shots each, seed 8, beside the forecast and beside a chain of events. Control: were a cell as
-/// often armed at each gate as counts alone leave it, more echoes would be seen where counts are rare and it is
-/// dead over the pause.
+/// N = 100 000 shots each, seed 8, beside the forecast and beside a chain of events. Control: a cell that is
+/// armed at each gate as often as counts alone leave it. It would see more echoes where counts are rare and
+/// it is dead over the pause.
 #[test]
 fn a_cell_remembers_what_it_saw_before_the_gate_opened() {
     for (dead_ns, rate) in [(300.0, 1e5), (1500.0, 1e5), (3200.0, 1e5), (1500.0, 1e6)] {

@@ -101,7 +101,7 @@ fn the_matched_receiver_finds_ground_of_which_one_mark_in_seven_is_seen() {
     let score = Sensor::printed(Matched).score(0..2, slope, Weather { seen: 0.15, ..CLEAR });
     let found = f64::from(score.right + score.wrong) / f64::from(score.echoes);
     assert!(found > 0.98, "{score:?}");
-    // What is wrong is a sidelobe of the own code word, which chance made the higher one.
+    // The wrong ones are on a sidelobe of the own code word, which chance made the higher one.
     assert_right(&score, 85.0, "faint");
 }
 
@@ -143,7 +143,7 @@ fn false_edges_alone_are_no_return() {
     let log = careless.log(0..1);
     let ticks = careless.ticks(&log, sky, weather);
     let returns = careless.receiver.decode(&careless.codebook, &log, &ticks).unwrap();
-    // Among so many ticks one shot in sixteen is searched for faint light.
+    // With ticks this dense, one shot in sixteen is searched for faint light.
     assert!(returns.rejected(Reject::NoPeak) < 848 - 848 / 16, "{:?}", returns.rejects);
 }
 
@@ -233,8 +233,9 @@ fn wall(_: u32, _: u32) -> Option<i64> {
     Some(280_000)
 }
 
-/// H0: where all light is faint, the quick receiver finds most of what the thorough one does. N = 2544
-/// shots of a wall of which one mark in 30 is seen, so that two thirds are found, and of one of which one in 40 is.
+/// H0: where all light is faint, the quick receiver finds most of what the thorough one does. N = 2544 shots
+/// of each of two walls: one mark in 30 of the first is seen, so that two thirds are found, and one in 40 of
+/// the second.
 #[test]
 fn faint_walls_are_found_without_looking_everywhere() {
     for (seen, share) in [(0.033, 0.8), (0.025, 0.7)] {

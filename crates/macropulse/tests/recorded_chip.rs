@@ -121,9 +121,9 @@ fn line(points: &[(f64, f64)]) -> (f64, f64) {
     (xy / xx, xy / (xx * yy).sqrt())
 }
 
-/// In 128 captures of each object, nine zones each: in seven of ten zones and more the simulated peak lies within a bin
-/// of the recorded one, and the counts of zones rise and fall together. Control: with the zones of the capture 40 places
-/// on, a pose that differs, fewer agree.
+/// N = 128 captures of each object, nine zones each. In seven of ten zones and more, the simulated peak lies
+/// within a bin of the recorded one. The counts of zones rise and fall together. Control: with the zones of
+/// the capture 40 places on, a pose that differs, fewer agree.
 #[test]
 fn the_simulated_chip_counts_as_the_real_one_does() {
     for (name, object) in [("pyramid.json", "pyramid2.stl"), ("tall_block.json", "tall_block.stl")]
@@ -155,8 +155,9 @@ fn the_simulated_chip_counts_as_the_real_one_does() {
     }
 }
 
-/// Where the chip sees a single surface of the pyramid, its counts fall with the distance of the peak as R^−2.07. Those of
-/// the simulation fall as R^−2.62: surfaces are tilted and fill zones in part, and a round beam is not a square zone.
+/// If the chip sees a single surface of the pyramid, its counts fall with the distance of the peak as
+/// R^−2.07. Those of the simulation fall as R^−2.62: surfaces are tilted and fill zones in part, and a round
+/// beam is not a square zone.
 #[test]
 fn counts_fall_with_the_square_of_the_distance() {
     let Some(zones) = zones("pyramid.json", "pyramid2.stl") else { return };

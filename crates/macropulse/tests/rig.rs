@@ -86,8 +86,8 @@ fn whole_mark(ours: &Design, scene: &Scene) -> f64 {
     of_mark / photon * 0.7
 }
 
-/// Energy is conserved: of all light that the other sends into the solid angle Ω of each pixel, that which falls
-/// on the area A of our aperture enters it: per scan Σn = n₀·A/(D²·Ω), however wide its beams are.
+/// Energy is conserved: of all light that the other sends into the solid angle Ω of each pixel, the part on
+/// the area A of our aperture enters it. Per scan Σn = n₀·A/(D²·Ω), however wide its beams are.
 #[test]
 fn the_light_of_a_scan_enters_an_aperture_by_its_area() {
     let stand = format!("position_m = [{DISTANCE}, 0, 0]\nyaw_deg = 180");
@@ -109,9 +109,9 @@ fn the_light_of_a_scan_enters_an_aperture_by_its_area() {
     }
 }
 
-/// H0: a scan of the other, which stands anywhere within a pixel, hits us with the chance π·s²·ln 2/Δ²; a hit is
-/// more than half of what a centred one brings, s² = a² + b²/2. N = 300 scans, seed 5, α = 1e-5 (|z| < 4.4).
-/// Controls: the aperture of 25 mm of every sensor without a link budget, and that of the other's file.
+/// H0: a scan of the other, which stands anywhere within a pixel, hits us with the chance π·s²·ln 2/Δ². A hit
+/// is more than half of what a centred one brings, s² = a² + b²/2. N = 300 scans, seed 5, α = 1e-5 (|z| <
+/// 4.4). Controls: the aperture of 25 mm of every sensor without a link budget, and that of the other's file.
 #[test]
 fn an_aperture_is_hit_as_often_as_its_area_says() {
     let (aperture_mm, scans) = (17.0, 300);
@@ -219,8 +219,8 @@ fn meeting(others: &[usize]) -> Scene {
     scene(&format!("[sensor]\n{}{}", US.keys(), each.collect::<String>()))
 }
 
-/// Known answer: each shot of each lidar on the move arrives when and as bright as the positions and attitudes
-/// of both at the time of the shot have it, and none else does.
+/// Known answer: each shot of each lidar on the move arrives at the time and with the brightness that both
+/// poses give at the time of the shot. No other shot arrives.
 #[test]
 fn light_of_lidars_on_the_move_follows_the_exact_geometry() {
     let ours = sensor(40.0);
@@ -285,8 +285,8 @@ fn lidars_do_not_change_the_light_of_each_other() {
     }
 }
 
-/// A rosette goes on from scan to scan, also through the time at which its clock reads 0: it comes by where its
-/// prisms turn it, θ_y + i·θ_z = Σ δ·exp(i·(2π·f·t + φ)).
+/// A rosette goes on from scan to scan, also through the time at which its clock reads 0. It comes by where
+/// its prisms turn it, θ_y + i·θ_z = Σ δ·exp(i·(2π·f·t + φ)).
 #[test]
 fn a_rosette_shines_where_its_prisms_turn_it() {
     let rosette = Design::open("rosette-mid-40", &[]).unwrap();

@@ -16,8 +16,8 @@ use tempfile::TempDir;
 const ROWS: usize = 5;
 const COLUMNS: usize = 7;
 
-/// Every third pixel is empty, the others have so many returns; no two returns have the same value in
-/// any column.
+/// Returns a cloud. Every third pixel is empty, the others have `returns_per_shot` returns; no two returns
+/// have the same value in any column.
 fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
     let pixels = ROWS * COLUMNS;
     let answered = (0..pixels).filter(|pixel| pixel % 3 != 2);
@@ -41,7 +41,7 @@ fn cloud_of(returns_per_shot: u8, with_truth: bool) -> PointCloud {
         truth.radial_velocity = each(&|at| 4.0 - at);
         for pixel in 0..pixels {
             let shown = all.iter().position(|&(other, _)| other == pixel);
-            // Of a pixel without a return, the first surface.
+            // The first surface of a pixel without a return.
             truth.pixels.push(shown.map_or(
                 Surface {
                     range: pixel as f32,
@@ -164,7 +164,7 @@ fn pcd_keeps_every_return_of_a_list_and_its_image() {
             assert_eq!((read.returns_per_shot, read.pick), (3, pick));
             assert_same_returns(&read, &written);
             assert_eq!(read.image(pick), written.image(pick));
-            // What is written again is the same.
+            // Written again, it is the same.
             let (_other, again) = write(Format::Pcd, &read);
             assert_eq!(fs::read(&path).unwrap(), fs::read(again).unwrap());
         }
@@ -206,7 +206,7 @@ fn formats_that_hold_every_attribute_give_every_attribute_back() {
             if name == "csv" {
                 renumber(&mut read, clouds.names());
             }
-            // E57 has seconds, of which a billionth is not always the same number.
+            // E57 has seconds, and a billionth of them is not always the same number.
             for (read, written) in read.time_ns.iter_mut().zip(&written.time_ns) {
                 assert!((*read - written).abs() <= 1e-12 * written.abs(), "{name}");
                 *read = *written;

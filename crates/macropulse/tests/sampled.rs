@@ -1,6 +1,6 @@
-//! A sampled lidar from sensor file to points, against what an independent Monte Carlo of the same design
-//! found: pulses summed through an amplifier, Poisson photons multiplied by gamma gains, a sampled matched
-//! filter, three marks of which two must be seen.
+//! A sampled lidar from sensor file to points, against the results of an independent Monte Carlo of the same
+//! design. It sums pulses through an amplifier, multiplies Poisson photons by gamma gains and applies a
+//! sampled matched filter. Two of three marks must be seen.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -17,7 +17,7 @@ use macropulse::random::Chance;
 use macropulse::scene::Scene;
 use macropulse::sim;
 
-/// A ready sensor, of which 64 rows are measured as fast as all are, and what is changed.
+/// Returns a ready sensor with `set` changed. It measures only 64 rows, as fast as it measures all.
 fn ready(name: &str, set: &[(&str, &str)]) -> Design {
     let fewer = [
         ("scan.raster.rows", "64"),
@@ -100,10 +100,10 @@ fn a_sampled_lidar_finds_what_an_independent_simulation_of_it_found() {
     assert!((0.7..0.9).contains(&pd), "{pd}");
 }
 
-/// The same for half as many bands: 10 % at 149 m Pd 0.991, rms 1.00 cm, none wrong (N 7976), 30 % 0.999 and
-/// 0.48 cm; of white at 75 m 0.963, since there two marks of some words of the study come while the channel is
-/// blind. H0: Pd no more than 0.005 below, rms within a sixth; N = 6784, seed 5. Control: of 5 % four in ten
-/// are seen.
+/// The same for half of the bands. At 149 m, 10 % has Pd 0.991, rms 1.00 cm and none wrong (N 7976), and 30 %
+/// has 0.999 and 0.48 cm. White at 75 m has 0.963, since two marks of some words of the study come there
+/// while the channel is blind. H0: Pd no more than 0.005 below, rms within a sixth; N = 6784, seed 5.
+/// Control: four in ten are seen at 5 %.
 #[test]
 fn half_as_many_bands_find_what_they_found() {
     let design = ready("coded-16", &[]);
@@ -123,9 +123,9 @@ fn half_as_many_bands_find_what_they_found() {
     assert!((0.3..0.5).contains(&pd), "{pd}");
 }
 
-/// At Pd between 0.05 and 1, and ranges at which many words have a mark that is blanked (60 and 75 m) and none
-/// (110 m): found is what is forecast, Pd to 0.02, and precision to a fifth. N = 13 568 each, seed 8: a share
-/// is known to 0.004. Control: with a tenth more light it is not.
+/// H0: results are as forecast, Pd to 0.02, and precision to a fifth. Pd is between 0.05 and 0.95. Many words
+/// have a mark that is blanked at some ranges (60 and 75 m), and none has at another (110 m). N = 13 568
+/// each, seed 8: a share is known to 0.004. Control: the forecast for a tenth more light is not found.
 #[test]
 fn forecasts_of_samples_hold() {
     let design = design(&[]);
@@ -145,10 +145,10 @@ fn forecasts_of_samples_hold() {
     }
 }
 
-/// Of a wall of 30 % all words are found at every range: no echo loses two marks of three to own light, whichever
-/// shot is sent when it comes. In steps of half a tick, 3 cm, from 5 m to the end of the gate. Control: words of 8 ns
-/// from mark to mark, for which own light was once taken, lose one in seven at 70.33 m; so do simulated shots, to 0.02,
-/// N = 13 568, seed 12.
+/// All words from a wall of 30 % are found at every range: no echo loses two marks of three to stray light,
+/// whichever shot is sent when it comes. The ranges are in steps of half a tick, 3 cm, from 5 m to the end of
+/// the gate. Control: words of 8 ns from mark to mark, once thought to be enough, lose one in seven at 70.33
+/// m. So do simulated shots, to 0.02, N = 13 568, seed 12.
 #[test]
 fn no_range_is_hidden_by_own_light() {
     let day = Environment::named("clear-day").unwrap();
@@ -168,10 +168,11 @@ fn no_range_is_hidden_by_own_light() {
     assert!((pd(&nearer) - forecast).abs() < 0.02 && pd(&own) > 0.999);
 }
 
-/// In the open there are no more points than the receiver is asked for, 3e-5 a shot; N = 13 568, seed 6, α = 1e-3
-/// of 3 of a mean of 0.4. With a wall of 10 % beyond the gate there are no more than the design accepts, 1e-4: what of
-/// its light is not found lies beside noise; N = 54 272, seeds 6 to 9, α = 1e-3 of 14 of a mean of 5.4. Of 203 520
-/// by other seeds 12 had a point. Control: a threshold for one in a hundred shots is crossed.
+/// In the open there are no more points than the receiver is asked for, 3e-5 a shot; N = 13 568, seed 6, α =
+/// 1e-3 of 3 of a mean of 0.4. With a wall of 10 % beyond the gate there are no more than the design accepts,
+/// 1e-4: what of its light is not found lies beside noise; N = 54 272, seeds 6 to 9, α = 1e-3 of 14 of a mean
+/// of 5.4. By other seeds, 12 of 203 520 had a point. Control: a threshold for one in a hundred shots is
+/// crossed.
 #[test]
 fn there_are_no_more_points_of_nothing_than_accepted() {
     let nothing = |design: &Design, range: f64, seed: u64| {
@@ -185,12 +186,12 @@ fn there_are_no_more_points_of_nothing_than_accepted() {
     assert!(nothing(&loose, 2000.0, 6) > 30.0);
 }
 
-/// Pulses near by are clipped, and timed by their edges. Own stray light blanks a part of the time: at 5 m
-/// the echo of one of ten words falls upon its own marks, with half as many bands at 40 m those of three.
+/// Pulses near by are clipped, and timed by their edges. Own stray light blanks a part of the time. The echo
+/// of one of ten words overlaps its own marks at 5 m, and with half of the bands those of three do at 40 m.
 /// Marks that are hidden so are no reason to believe in noise, nor in words that lie in the long clipped
 /// pulses of others. A tick is 6 cm, and the amplifier that stays at its limit tells the end of a pulse to a
-/// whole one: rms no more than three quarters of that, mean a quarter. H0: 0.9995 are right and 1e-4 wrong;
-/// N = 13 568 and 6784, seed 7. Control: a channel that is blind for as long as a word has fewer.
+/// whole one. So rms is no more than three quarters of that, and mean a quarter. H0: 0.9995 are right and
+/// 1e-4 wrong; N = 13 568 and 6784, seed 7. Control: a channel that is blind for as long as a word has fewer.
 #[test]
 fn what_is_near_is_clipped_and_told_all_the_same() {
     let [wide, narrow] = ["coded-32", "coded-16"].map(|name| ready(name, &[]));
@@ -234,10 +235,11 @@ fn the_worst_range_is_forecast_as_it_is_found() {
     assert!(share(there.range + 5.0) > 0.999);
 }
 
-/// Behind a capacitor own marks pull the baseline down by forty deviations of the noise. A receiver that knows
-/// the cutoff adds to the samples what it took: of 5 % at 149 m as much is found as without it, and as is
-/// forecast, to 0.02, up to 500 kHz; from 1 MHz on the baseline leaves the converter, and there is no forecast.
-/// N = 13 568 each, seed 9: a share is known to 0.0034. Control: a receiver that does not know finds nothing.
+/// Behind a capacitor own marks pull the baseline down by forty deviations of the noise. A receiver that
+/// knows the cutoff adds to the samples what it took. Up to 500 kHz, 5 % at 149 m is found as often as
+/// without a capacitor, and as forecast, to 0.02. From 1 MHz on the baseline leaves the converter, and there
+/// is no forecast. N = 13 568 each, seed 9: a share is known to 0.0034. Control: a receiver that does not
+/// know finds nothing.
 #[test]
 fn a_baseline_that_droops_is_known_to_the_receiver() {
     let day = Environment::named("clear-day").unwrap();
@@ -292,8 +294,8 @@ fn forecasts_of_speckle_hold() {
     }
 }
 
-/// Where the samples of two bands overlap they are the same, to the last bit, though the baseline remembers
-/// a fifth of what either lasts. Control: another seed makes others.
+/// If two bands overlap, their samples there are the same, to the last bit, though the baseline remembers a
+/// fifth of what either lasts. Control: another seed makes others.
 #[test]
 fn a_baseline_is_the_same_in_both_bands_that_see_it() {
     // Two lines, one behind the other.
@@ -330,7 +332,7 @@ fn a_baseline_is_the_same_in_both_bands_that_see_it() {
     }
 }
 
-/// What is sampled of a band does not depend on how many bands are computed, nor by how many threads.
+/// The samples of a band do not depend on how many bands are computed, nor by how many threads.
 #[test]
 fn bands_side_by_side_are_those_one_after_the_other() {
     let design = design(&[("scan.raster.rows", "32"), ("scan.raster.vertical_deg", "1.62")]);

@@ -267,7 +267,7 @@ fn forged(folder: &Path) {
     // A file that never ends.
     let told = refused(folder, "forged.gltf", text(",\"uri\":\"/dev/zero\"").as_bytes());
     assert!(told.contains("lies outside the folder of the scene"), "{told}");
-    // What is merely missing, and not needed here, is no reason to refuse.
+    // A value that is merely missing, and not needed here, is no reason to refuse.
     attempt(folder, "forged.glb", &with(r#","min":[0,0,0],"max":[1,1,1]"#, "")).unwrap();
     attempt(folder, "forged.glb", &with(r#""byteStride":12"#, r#""byteStride":0"#)).unwrap();
 }

@@ -44,8 +44,8 @@ fn expected(design: &Design, cloud: &PointCloud, at: usize, distance: f64) -> f6
     distance / design.directions().of(cloud.row[at], cloud.column[at])[0]
 }
 
-/// Whether a return lies so far aside that the pane does not mirror the light back: there it has its
-/// diffuse reflectance of 0.02, and the wall, through it, 0.1 · 0.8².
+/// Returns true if a return lies so far aside that the pane does not mirror the light back. There the pane
+/// has its diffuse reflectance of 0.02, and the wall, through it, 0.1 · 0.8².
 fn is_aside(cloud: &PointCloud, at: usize) -> bool {
     cloud.y[at].abs() > 0.2 * cloud.x[at]
 }
@@ -107,9 +107,9 @@ fn one_return_is_one_return_at_the_surface_that_is_picked() {
     }
 }
 
-/// H₀: a shot that met one surface has a second return with probability 10⁻⁶, the false alarm of the
-/// sensor; N > 20 000, seed 5. Of two or more the chance is below 10⁻³. Negative control: the pane
-/// of the tests above.
+/// H₀: a shot that met one surface has a second return with probability 10⁻⁶, the false alarm of the sensor;
+/// N > 20 000, seed 5. The chance of two or more is below 10⁻³. Negative control: the pane of the tests
+/// above.
 #[test]
 fn a_wall_alone_has_no_second_return() {
     let design = design("kim-park-2016-fixed", &[("receiver.returns", "4")]);

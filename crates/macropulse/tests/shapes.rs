@@ -34,7 +34,8 @@ fn outside(shape: Shape, [x, y, z]: [f64; 3]) -> f64 {
     }
 }
 
-/// Where a ray first changes sides between `from` and 12 m on, found by steps of 2 mm and halving.
+/// Returns the range at which a ray first changes sides between `from` and 12 m on, found by steps of 2 mm
+/// and halving.
 fn first_change(shape: Shape, pose: &Pose, ray: &Ray, from: f64) -> Option<f64> {
     let local = pose.sensor_from_world();
     let side = |range: f64| {
@@ -65,8 +66,8 @@ fn unit(chance: &mut ChaCha8Rng) -> [f64; 3] {
     }
 }
 
-/// Rays at turned shapes, from outside and from inside, meet them where the way from outside to
-/// inside is found by steps; where they meet nothing there is no such place.
+/// Rays at turned shapes, from outside and from inside, meet them where steps find the way from outside to
+/// inside. If they meet nothing, there is no such place.
 #[test]
 fn rays_meet_shapes_where_the_inside_begins() {
     let mut chance = ChaCha8Rng::seed_from_u64(7);

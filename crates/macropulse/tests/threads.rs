@@ -10,7 +10,8 @@ use macropulse::sim::{self, Scan, Tally};
 
 const SEED: u64 = 20_160_913;
 
-/// The bands measured: all of them, the first ones, or those of nine lines, so many times, of the road close by.
+/// The bands measured: all of them, the first ones, or those of the road close by, nine lines for each one
+/// counted.
 #[derive(Clone, Copy)]
 enum Part {
     Whole,

@@ -1,5 +1,4 @@
-//! Ranges of ready sensors have no bias: from the shot to the point, against a target of which the
-//! range is known.
+//! Ranges of ready sensors have no bias: from the shot to the point, against a target at a known range.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::HashMap;
@@ -113,12 +112,11 @@ fn errors(design: &Design, environment: &str) -> Errors {
     (of_range, of_word)
 }
 
-/// H0: at every range, and of every code word, the mean error is no more than a tenth of a tick. One
-/// band at each of ten ranges, N = 16 960 shots or more a sensor, seed 1; rejected at 4.5 standard
-/// errors beyond, α = 7e-6 for each of the 400 means. Nearer than 10 m white light is so strong for
-/// kim-park-2016-physical that it lights every tick that a micropulse reaches into: then nothing
-/// undoes the rounding, and this range is left out. Control: the same ranges half a tick farther
-/// away are rejected.
+/// H0: at every range, and of every code word, the mean error is no more than a tenth of a tick. One band at
+/// each of ten ranges, N = 16 960 shots or more a sensor, seed 1. Rejected at 4.5 standard errors beyond, α =
+/// 7e-6 for each of the 400 means. Nearer than 10 m white light is so strong for kim-park-2016-physical that
+/// it lights every tick that a micropulse reaches into. Then nothing undoes the rounding, and this range is
+/// left out. Control: the same ranges half a tick farther away are rejected.
 #[test]
 fn coded_sensors_measure_ranges_without_bias() {
     let mut biased = Vec::new();
@@ -155,18 +153,18 @@ fn errors_of_scans(design: &Design, material: &str, scans: u64) -> [Sums; 10] {
         let cloud = sim::scan_part(design, &room, seed, &all).unwrap().cloud();
         let mut sums = Sums::default();
         let errors = cloud.range.iter().map(|found| f64::from(*found) - range);
-        // What fires by itself is no measurement of this target.
+        // A detector that fires by itself does not measure this target.
         errors.filter(|error| error.abs() < 1.0).for_each(|error| sums.add(error / metres));
         sums
     })
 }
 
 /// H0: over ten ranges the rms error is no more than 1.2 times the forecast, of white by day, or by night
-/// where the sun leaves nothing. N = 16 960 points or more a sensor and range of those with a code,
-/// 28 928 of vlp-16, 12 288 of peregrine; the root of the mean square over the ranges has a standard
-/// error below 0.3 %. Ranges are taken together, as how precise a point is depends on where in a tick
-/// it comes, over which the forecast is a mean. Sidelobes are no part of it: what is farther off than
-/// a right point may be is left out. Control: with every range half a tick farther away it is rejected.
+/// where the sun leaves nothing. N = 16 960 points or more a sensor and range of those with a code, 28 928 of
+/// vlp-16, 12 288 of peregrine. The root of the mean square over the ranges has a standard error below 0.3 %.
+/// Ranges are taken together, as how precise a point is depends on where in a tick it comes, over which the
+/// forecast is a mean. Sidelobes are no part of it: what is farther off than a right point may be is left
+/// out. Control: with every range half a tick farther away it is rejected.
 #[test]
 fn points_are_as_precise_as_forecast() {
     let mut worse = Vec::new();
@@ -283,12 +281,12 @@ fn reflectance(forecaster: &Forecaster, wanted: f64, range: f64) -> f64 {
     high
 }
 
-/// H0: at every range, and over all of them, the mean error is no more than a tenth of a tick: in
-/// strong light, where the walk is largest, and in faint light, where few more photons come than fire
-/// the detector. N = 288 000 shots a range of hdl-64e, 163 840 of peregrine, seeds 1 to 10; rejected at
-/// 4.5 standard errors beyond, α = 7e-6 for each of at most 66 means. Control: with 0.2 ticks less,
-/// the bias of peregrine if it were calibrated for the walk at the mean of what is drawn, the errors
-/// over all white targets are rejected.
+/// H0: at every range, and over all of them, the mean error is no more than a tenth of a tick. It is so in
+/// strong light, where the walk is largest, and in faint light, where few more photons come than fire the
+/// detector. N = 288 000 shots a range of hdl-64e, 163 840 of peregrine, seeds 1 to 10. Rejected at 4.5
+/// standard errors beyond, α = 7e-6 for each of at most 66 means. Control: with 0.2 ticks less, the errors
+/// over all white targets are rejected. Peregrine would have this bias if it were calibrated for the walk at
+/// the mean of what is drawn.
 #[test]
 fn classical_sensors_measure_ranges_without_bias() {
     let mut biased = Vec::new();

@@ -41,8 +41,8 @@ fn manual() -> [(f64, f64); 16] {
     })
 }
 
-/// Firing times, directions and origins by the manual's formulae: laser n of firing sequence m fires
-/// after 55.296 µs · m + 2.304 µs · n, and the head turns by 360° in 0.1 s.
+/// Firing times, directions and origins by the manual's formulae. Laser n of firing sequence m fires after
+/// 55.296 µs · m + 2.304 µs · n. The head turns by 360° in 0.1 s.
 #[test]
 fn the_vlp_16_fires_when_and_where_its_manual_says() {
     let design = vlp_16(&[]);
@@ -260,7 +260,7 @@ fn a_calibration_is_a_list_of_lasers() {
         }
         assert_eq!(design.scan.gates().offset(row), listed.scan.gates().offset(row));
     }
-    // What the file says is in the digest of the sensor.
+    // The contents of the file are in the digest of the sensor.
     let before = design.digest();
     std::fs::write(folder.path().join("two.yaml"), yaml.replace("0.05", "0.06")).unwrap();
     assert_ne!(Design::open(&path, &[]).unwrap().digest(), before);
@@ -335,7 +335,7 @@ fn what_a_head_cannot_be_is_told() {
         let message = told(keys);
         assert!(message.contains(said), "{keys}: {message}");
     }
-    // What is named replaces what the parent has.
+    // A key that is named replaces what the parent has.
     assert_eq!(told("scan.spinning.azimuth_step_deg = 0.2"), "");
     let block = "scan.spinning.blocks = [{ lasers = 8, first_deg = 7.0, step_deg = -2.0 }]";
     assert_eq!(told(block), "");

@@ -82,7 +82,7 @@ pub fn run(options: &Check, common: &Common) -> Result<(), Fault> {
     if wrong { Err(Fault::Told) } else { Ok(()) }
 }
 
-/// What there is to say of a file that is right.
+/// Report on a file without faults.
 struct Report {
     text: String,
     json: Value,
@@ -162,7 +162,7 @@ fn scenario(name: &str, scenario: &Scenario, memory: &MemoryLimit) -> Result<Rep
     })
 }
 
-/// What a run is estimated to take, for people.
+/// Returns the memory that a run is estimated to take, for people.
 fn estimated(estimate: &Estimate) -> String {
     let threads = rayon::current_num_threads() as u64;
     let (all, each) = (told(estimate.total(threads as usize)), told(estimate.band));

@@ -11,7 +11,7 @@ use crate::fault::Fault;
 use crate::memory::{self, MemoryLimit, told as told_memory};
 use crate::text::{Columns, grouped, short};
 
-/// What a scene is made of, and what was assumed in reading it.
+/// Reports the contents of a scene, and the assumptions made in reading it.
 pub fn report(scene: &Scene, memory: &MemoryLimit) -> Result<Report, Fault> {
     let estimate = Estimate { scene: of_scene(scene), ..Estimate::default() };
     memory.allow_alone(&scene.name, &estimate)?;

@@ -17,8 +17,8 @@ use crate::fault::Fault;
 use crate::memory::{self, MemoryLimit};
 use crate::text::{Columns, counted, grouped, section, short};
 
-/// What follows from a sensor and, for its light, from an environment; and what it takes for
-/// granted.
+/// Reports all that follows from a sensor and, for its light, from an environment, and the effects that it
+/// idealises.
 pub fn report(
     design: &Design,
     environment: &Environment,
@@ -77,8 +77,8 @@ pub fn report(
     Ok(Report { text, json })
 }
 
-/// Of so many cells speckle varies the light of an echo by a tenth: less than noise does an echo that is only
-/// just found, by a sixth where that is at six standard deviations of it.
+/// Speckle cells from which on speckle is negligible: it varies the light of an echo by a tenth. Noise varies
+/// an echo that is only just found by a sixth, if the threshold is at six standard deviations of the noise.
 const NEGLIGIBLE: f64 = 100.0;
 
 /// The speckle cells of an echo from the rated range, square on; `None` where beam or aperture are not known.
@@ -86,7 +86,7 @@ fn speckle_cells(design: &Design) -> Option<f64> {
     Some(Speckle::of(design)?.cells(design.scan.rated_range, 1.0))
 }
 
-/// What sun and air do to it.
+/// Reports the effects of sun and air on a sensor.
 fn at_work(design: &Design, (operating, estimate): (&Operating, &Estimate)) -> Columns {
     let mut columns = Columns::default();
     let detector = design.detector.model();

@@ -14,10 +14,10 @@ use crate::fault::Fault;
 /// Most users of a curve.
 const MOST_USERS: u32 = 64;
 
-/// Errors below are not drawn: the lifetime of the sensor has not so many bits.
+/// Least error that is drawn: a sensor does not send 10²⁰ bits in its lifetime.
 const LEAST_ERROR: f64 = 1e-20;
 
-/// Probability of a wrong bit among so many users.
+/// Probability of a wrong bit, for a number of users.
 type Errors = fn(&MultipleAccess) -> f64;
 
 /// Name of the page, and of the pictures of errors.

@@ -21,7 +21,7 @@ use crate::options::Common;
 use crate::progress::Progress;
 use crate::text::{pour, warn};
 
-/// Where the points go.
+/// Destination of the points.
 pub enum Sink {
     /// They are only counted.
     Nothing,
@@ -31,7 +31,7 @@ pub enum Sink {
     Folder(Folder, Vec<Format>, bool),
 }
 
-/// What decodes.
+/// Sensor and environment of a run.
 #[derive(Clone, Copy)]
 pub struct Setting<'a> {
     pub design: &'a Design,
@@ -58,11 +58,11 @@ pub struct Run<'a> {
     is_announced: bool,
     /// True once the reader of stdout has closed its end.
     has_lost_reader: bool,
-    /// Whether stdout has the points.
+    /// True if stdout has the points.
     pub is_streamed: bool,
     /// Pixels to be explained.
     asked: Vec<Pixel>,
-    /// What was explained, for people and for programs.
+    /// Explanations of pixels, for people and for programs.
     pub explained: Vec<(String, Value)>,
     has_header: bool,
 }
@@ -233,7 +233,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// What its user should know, said at once.
+    /// Finds the warnings, and prints them at once.
     fn find_warnings(&mut self, sink: &Sink, common: &Common) {
         if self.returns == 0 && self.shots > 0 {
             let reason = match self.recorded {
@@ -257,7 +257,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// What is needed to repeat the run, and what was counted.
+    /// Returns the manifest: the data to repeat the run, and its counts.
     pub fn manifest(&self) -> Value {
         let [shots, record] = &self.inputs;
         let decoded = Decoded {

@@ -1,4 +1,4 @@
-//! What is printed of a run that decodes.
+//! Printed report of a run that decodes.
 
 use macropulse::codec::decode::Reject;
 use serde_json::Value;

@@ -21,9 +21,9 @@ use crate::{completions, input};
 
 /// Print the macropulse that is sent to a pixel, mark by mark, or write the shot log of a scan
 ///
-/// Without --pixel the shot log of the scan is written, as `decode` reads it; with --wall-m also the
-/// ticks that an ideal detector and unlimited converters would give of a white wall at that range
-/// from every pixel: a test vector for a decoder in hardware.
+/// Without --pixel the shot log of the scan is written, as `decode` reads it. With --wall-m the ticks of a
+/// white wall at that range from every pixel are written too. They are those of an ideal detector and
+/// unlimited converters: a test vector for a decoder in hardware.
 #[derive(Args)]
 #[command(after_help = "Examples:
   macropulse encode kim-park-2016 --pixel 0,1

@@ -32,7 +32,7 @@ pub fn stream(recorded: Recorded) -> Result<(), Fault> {
     print_bytes(&log)
 }
 
-/// The pose of a sensor of which nothing else is known.
+/// Pose of a sensor if nothing else is known of it.
 const LEVEL: ([f64; 3], [f64; 4]) = ([0.0; 3], [1.0, 0.0, 0.0, 0.0]);
 
 /// Refuses a scan that the clock of the sensor does not count to.

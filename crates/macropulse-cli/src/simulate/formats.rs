@@ -25,7 +25,7 @@ pub struct Records {
 }
 
 impl Records {
-    /// Whether none is asked for.
+    /// Returns true if none is asked for.
     pub fn is_none(self) -> bool {
         self == Self::default()
     }
@@ -80,7 +80,7 @@ impl Default for Formats {
 }
 
 impl Formats {
-    /// What `--help` says of them.
+    /// Returns the text on formats in `--help`.
     pub fn help() -> String {
         let names =
             |formats: &[Format]| formats.iter().map(|format| format.name()).collect::<Vec<_>>();

@@ -128,7 +128,7 @@ fn receivers() -> PossibleValuesParser {
 }
 
 impl Simulate {
-    /// What is to be done, all of it checked.
+    /// Returns the scenario to be simulated, all of it checked.
     fn scenario(&self) -> Result<Scenario, Fault> {
         let mut changes = self.changes.apart(&self.surroundings)?;
         changes.of_scene.extend(self.outside.changes());

@@ -18,7 +18,7 @@ use macropulse::sim::{Record, Scans};
 
 use crate::fault::Fault;
 
-/// What of a sensor is written beside its shots.
+/// Record of a sensor that is written beside its shots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kept {
     /// Ticks; they and the shots in this form.
@@ -104,7 +104,7 @@ impl Recorded<'_> {
         Ok(())
     }
 
-    /// What is said of its ticks, as many as are known.
+    /// Returns the header of its ticks, with the `count` of those that are known.
     pub fn header(&self, measured: bool, count: u64) -> TickHeader {
         TickHeader {
             tick_fs: self.design.clock.tick_fs,
@@ -116,7 +116,7 @@ impl Recorded<'_> {
     }
 }
 
-/// What is said of a record before it comes.
+/// Header of a record.
 enum Header {
     Ticks(TickHeader, Form),
     Samples(SampleHeader),
@@ -200,8 +200,8 @@ struct Waiting {
     file: WholeFile,
     /// The shot in its scan that the next band begins with.
     next: u64,
-    /// Of bands that are done before others that come first, by their first shot: their shots, and
-    /// their record as bytes.
+    /// Bands that are done before earlier ones, by their first shot: the number of their shots, and their
+    /// record as bytes.
     early: BTreeMap<u64, (u64, Vec<u8>)>,
     count: u64,
     failed: Option<io::Error>,

@@ -34,14 +34,14 @@ pub struct Run<'a> {
     pub tally: Tally,
     /// Wall-clock time, s.
     pub elapsed: f64,
-    /// Of which writing files, s.
+    /// Wall-clock time of that for writing files, s.
     pub writing: f64,
-    /// Where the files are, and their names; empty where none were wanted.
+    /// Folder and names of the files; empty if none were wanted.
     pub folder: String,
     pub files: Vec<String>,
-    /// What was explained, for people and for programs.
+    /// Explanations of pixels, for people and for programs.
     pub explained: Vec<(String, Value)>,
-    /// What its user should know.
+    /// Warnings to the user.
     pub warnings: Vec<String>,
     /// True once the manifest of this run is on the disk.
     is_announced: bool,
@@ -62,7 +62,7 @@ impl<'a> Run<'a> {
             Err(fault) => {
                 run.state = State::Failed;
                 if let Some(folder) = folder.as_ref().filter(|_| run.is_announced) {
-                    // What failed first is what is told.
+                    // The first failure is the one to be told.
                     let _ = run.manifest().write(folder.path());
                 }
                 Err(fault)
@@ -190,8 +190,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Writes the manifest of a run that has no file yet, in place of that of an older one, whose files
-    /// this one is about to replace; those that stay, it names.
+    /// Writes the manifest of a run that has no file yet. It replaces the manifest of an older run, whose
+    /// files this one is about to replace, and names the files that stay.
     fn announce(&mut self, folder: &Folder) -> Result<(), Fault> {
         let mut manifest = self.manifest();
         manifest.warnings.extend(folder.warning_of_older(&[]));
@@ -263,7 +263,7 @@ impl<'a> Run<'a> {
         self.warnings.extend(wrong.into_iter().chain(found));
     }
 
-    /// What is needed to repeat the run and to judge it.
+    /// Returns the manifest: the data to repeat the run and to judge it.
     pub fn manifest(&self) -> Manifest {
         record::manifest(&record::Run {
             state: self.state,

@@ -1,4 +1,4 @@
-//! What is to be simulated: a scenario file, or what the options say in its place.
+//! Scenarios to be simulated: a scenario file, or the options in its place.
 
 use std::ffi::{OsStr, OsString};
 use std::ops::Range;
@@ -34,12 +34,12 @@ pub struct Scenario {
     pub scans: u64,
     pub seed: u64,
     pub formats: Vec<Format>,
-    /// What is written of what was recorded.
+    /// Records that are written.
     pub records: Records,
     pub truth: bool,
     /// Pixels to be explained.
     pub explain: Vec<Pixel>,
-    /// Whether there is a page to look at the clouds with.
+    /// True if a page to look at the clouds is written.
     pub has_page: bool,
 }
 
@@ -72,7 +72,7 @@ struct ScenarioFile {
 }
 
 impl Scenario {
-    /// Whether neither clouds nor records are written.
+    /// Returns true if neither clouds nor records are written.
     pub fn writes_nothing(&self) -> bool {
         self.formats.is_empty() && self.records.is_none()
     }
@@ -181,7 +181,7 @@ impl Scenario {
     }
 }
 
-/// Whether all sensors can be simulated under the sun of the scene.
+/// Checks that all sensors can be simulated under the sun of the scene.
 fn check_operating(designs: &[Design], scene: &Scene) -> Result<(), Fault> {
     for design in designs {
         Operating::of(design, &scene.environment)?;
@@ -189,7 +189,7 @@ fn check_operating(designs: &[Design], scene: &Scene) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Whether so many scans can be had of the sensors: the sentence that says why not.
+/// Checks that the sensors can make this number of scans; else returns the sentence that says why not.
 pub fn check_scans(scans: u64, designs: &[Design]) -> Result<(), String> {
     if scans == 0 {
         return Err("0 scans are none; ask for at least 1".to_owned());

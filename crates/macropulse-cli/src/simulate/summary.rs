@@ -1,4 +1,4 @@
-//! What is printed of a run.
+//! Printed report of a run.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::run::Run;
 use crate::text::{Columns, NO_BREAK, counted, grouped, lasted, short};
 
-/// What was written to a folder, and what to open there.
+/// Returns the number of files written to a folder, and the page to open there.
 pub fn written(files: &[String], folder: &str) -> String {
     let count = counted(files.len() as u64, "file");
     let page = Path::new(folder).join(PAGE);

@@ -25,10 +25,9 @@ use crate::text::{NO_BREAK, counted, print, warn};
 
 /// Vary a key of a sensor and draw how well it does, with 95 % intervals
 ///
-/// Every value is measured with several seeds; each of these scans leaves a small file in
-/// DIR/jobs. What is there is not measured again, so the same command goes on where it was stopped.
-/// When nothing is missing, a page, index.html, and sweep.csv, sweep.svg, sweep.png and manifest.json
-/// are written.
+/// Every value is measured with several seeds; each of these scans leaves a small file in DIR/jobs. A scan
+/// with a file is not measured again, so the same command goes on where it was stopped. When nothing is
+/// missing, a page, index.html, and sweep.csv, sweep.svg, sweep.png and manifest.json are written.
 #[derive(Args)]
 #[command(after_help = after_help())]
 pub struct Sweep {
@@ -83,7 +82,7 @@ pub struct Sweep {
     #[arg(value_parser = whole(0..=1_u64 << 62))]
     seed: u64,
 
-    /// Measure only about so many shots of each scan, in whole bands, evenly over it
+    /// Measure only about N shots of each scan, in whole bands, evenly over it
     #[arg(long, value_name = "N")]
     shots: Option<NonZeroU64>,
 

@@ -1,4 +1,4 @@
-//! What is printed of a sweep.
+//! Printed report of a sweep.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ pub fn text(plan: &Plan, table: &Table, folder: &Path) -> String {
     text.replace(NO_BREAK, " ")
 }
 
-/// What is left to do, for people.
+/// Returns the scans that are left to do, for people.
 pub fn text_of_missing(plan: &Plan, missing: &[usize], shard: Shard) -> String {
     let (left, all) = (grouped(missing.len() as u64), counted(plan.count() as u64, "scan"));
     let options: Vec<String> =
@@ -46,7 +46,7 @@ pub fn json(plan: &Plan, table: &Table) -> String {
     format!("{:#}\n", versioned(plan.json(table)))
 }
 
-/// What is left to do, for programs.
+/// Returns the scans that are left to do, for programs.
 pub fn json_of_missing(plan: &Plan, missing: &[usize], shard: Shard) -> String {
     format!("{:#}\n", versioned(plan.json_of_missing(missing, shard)))
 }

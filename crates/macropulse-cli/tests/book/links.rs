@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-/// What a page links to, and what can be linked to in it.
+/// Links of a page, and the anchors that can be linked to in it.
 pub struct Text {
     pub links: Vec<Link>,
     pub anchors: BTreeSet<String>,
@@ -14,7 +14,7 @@ pub struct Link {
     pub line: usize,
     /// Relative path; empty for the page itself.
     pub file: String,
-    /// What stands behind `#`.
+    /// Text behind `#`.
     pub anchor: Option<String>,
 }
 

@@ -72,7 +72,7 @@ fn every_link_leads_somewhere() {
     assert!(count > 200, "only {count} links found");
 }
 
-/// Whether a link on `page` leads to a file, and to an anchor of those that `anchors` finds in it.
+/// Returns true if a link on `page` leads to a file, and to an anchor that `anchors` finds in it.
 fn leads(page: &Path, link: &Link, anchors: &dyn Fn(&Path) -> BTreeSet<String>) -> bool {
     let file = match link.file.as_str() {
         "" => page.to_path_buf(),

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 /// A folder to work in.
 pub struct Desk(TempDir);
 
-/// What the program said and how it ended.
+/// Output of the program, and how it ended.
 pub struct Ran {
     pub code: Option<i32>,
     pub out: String,

@@ -9,13 +9,13 @@
 //! -->
 //! ```
 //!
-//! A line `name = command` is a command that prints JSON, run there. Any other line is a part of the
-//! page with places for figures: filled in, it must stand on the page exactly once. In braces stands
-//! where the figure is: keys and numbers in lists with points between, behind the name of a command or
-//! nothing for the last one; also a sum of them, as `{.outcomes.right + .outcomes.near}`, or a
-//! difference. Behind a colon stands how it is written: `.2` with two decimals; `.2 %` in per cent, rounded
-//! down as the program does, so that 100 % is all; `.1 mm` in millimetres, `.1 MB` in megabytes; `.1e` as
-//! 4.1·10⁻⁷. Without that it is a whole number or a text.
+//! A line `name = command` is a command that prints JSON, run there. Any other line is a part of the page
+//! with places for figures: filled in, it must stand on the page exactly once. Braces hold the path to a
+//! figure: keys and numbers in lists with points between, behind the name of a command or nothing for the
+//! last one. A sum of figures, as `{.outcomes.right + .outcomes.near}`, or a difference is possible too. The
+//! format stands behind a colon: `.2` with two decimals; `.2 %` in per cent, rounded down as the program
+//! does, so that 100 % is all; `.1 mm` in millimetres, `.1 MB` in megabytes; `.1e` as 4.1·10⁻⁷. Without a
+//! format the figure is a whole number or a text.
 
 use std::collections::HashMap;
 
@@ -24,13 +24,13 @@ use serde_json::Value;
 use crate::desk::Desk;
 use crate::page::{Held, Page, one_blank};
 
-/// What the commands of a page have printed so far, by the names that the page gives them.
+/// JSON that the commands of a page have printed so far, by the names that the page gives them.
 #[derive(Default)]
 pub struct Sources {
     told: HashMap<String, Value>,
     /// The name of the last one.
     last: String,
-    /// What has been found on the page.
+    /// Lines that have been found on the page.
     found: Vec<String>,
 }
 
@@ -160,7 +160,7 @@ fn written(number: f64, form: &str) -> Option<String> {
         "" => number,
         "%" => {
             let steps = 10_f64.powi(2 + decimals as i32);
-            // What is a whole number of steps stays one.
+            // A whole number of steps stays one.
             (number * steps + 1e-6).floor() / steps * 100.0
         }
         "mm" => number * 1e3,

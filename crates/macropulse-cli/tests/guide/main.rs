@@ -1,6 +1,6 @@
-//! The guide does what it says. Every command of README.md and of the pages in docs runs, what a page
-//! shows of the output is printed, and the figures in its tables and sentences are those of a command.
-//! How pages say where their figures come from: "A page of the guide" in CONTRIBUTING.md.
+//! The guide does what it says. Every command of README.md and of the pages in docs runs. It prints the
+//! output that the page shows. The figures in the tables and sentences of a page are those of a command. How
+//! pages say where their figures come from: "A page of the guide" in CONTRIBUTING.md.
 //!
 //! Python that is not saved to a file is run by the tests of the Python package.
 #![allow(clippy::unwrap_used, missing_docs)]
@@ -152,7 +152,7 @@ fn constants_of_the_receiver_are_those_of_the_code() {
     assert!(held > 5, "{held}");
 }
 
-/// What a reader has before a page begins. Of the README: ticks recorded of two lines of its sensor.
+/// Commands that run before a page begins. The README begins with ticks recorded of two lines of its sensor.
 const BEFORE: [(&str, &str); 1] = [(
     "README.md",
     "macropulse encode kim-park-2016-fixed --set scan.raster.rows=2 --set scan.scans_per_s=14400 \\\n\

@@ -4,7 +4,7 @@
 pub struct Page {
     /// Its path from the root of the repository.
     pub name: String,
-    /// What there is to do, in the order of the page.
+    /// Parts to be tested, in the order of the page.
     pub parts: Vec<Part>,
     /// All of it but the comments, in words with one blank between them.
     pub words: String,
@@ -13,7 +13,7 @@ pub struct Page {
     pub rows: Vec<(usize, String)>,
 }
 
-/// What there is to do about a page.
+/// A part of a page that is tested.
 pub enum Part {
     Block(Block),
     Figures(Held),

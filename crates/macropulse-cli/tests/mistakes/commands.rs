@@ -1,4 +1,4 @@
-//! What is typed behind the name of the program.
+//! Mistakes on the command line.
 
 use super::{Desk, Row, refused};
 

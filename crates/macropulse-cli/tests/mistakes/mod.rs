@@ -1,8 +1,8 @@
 //! The mistakes that newcomers make, and what they are told: the place, what is wrong, and what to do.
 //!
-//! A row is what is done and the words that must be in the answer. For all of them the exit code is
-//! 2, the answer is one sentence for each thing that is wrong, in no words of the language that the
-//! program is written in, and nothing is written.
+//! A row is an action and the words that must be in the answer. The exit code of all rows is 2, and nothing
+//! is written. The answer is one sentence for each mistake, in no words of the language that the program is
+//! written in.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -17,7 +17,7 @@ mod sensors;
 
 use common::{Desk, Ran};
 
-/// What is done, and words of the answer.
+/// An action, and words of the answer.
 type Row = (&'static str, &'static [&'static str]);
 
 /// Words of parsers and systems.
@@ -36,14 +36,14 @@ const THEIRS: [&str; 12] = [
     "panicked",
 ];
 
-/// Runs each line, all of which must be refused with the words of their row.
+/// Runs each line. All of them must be refused with the words of their row.
 fn refused<'a>(desk: &Desk, rows: impl IntoIterator<Item = (String, &'a [&'a str])>) {
     let rows = rows.into_iter();
     let wrong: Vec<String> = rows.filter_map(|row| wrong(desk, &row.0, row.1)).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
 }
 
-/// Checks a file `mine.toml` of each text behind `head`, all of which must be refused.
+/// Checks a file `mine.toml` of `head` and each text. All of them must be refused.
 fn files_refused(desk: &Desk, head: &str, rows: &[Row]) {
     let wrong = rows.iter().filter_map(|(text, words)| {
         let text = format!("{head}{text}\n");
@@ -54,7 +54,7 @@ fn files_refused(desk: &Desk, head: &str, rows: &[Row]) {
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
 }
 
-/// What is wrong with the answer to `line`, if anything is.
+/// Returns the fault of the answer to `line`, if it has one.
 fn wrong(desk: &Desk, line: &str, words: &[&str]) -> Option<String> {
     let before = desk.files();
     let Ran { code, out, err } = desk.run(line);

@@ -24,7 +24,7 @@ static PYTHON: LazyLock<std::path::PathBuf> = LazyLock::new(|| {
     macropulse_testbed::python(&wanted).unwrap()
 });
 
-/// What the oracle says to a question.
+/// Asks the oracle a question, and returns its answer.
 fn ask(desk: &Desk, question: &str, given: &Value) -> Value {
     let oracle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracle");
     let file = desk.path().join(format!("{question}.json"));
@@ -46,8 +46,7 @@ fn assert_near(program: f64, oracle: f64, tolerance: f64) {
     assert!(off <= tolerance, "the program says {program}, the oracle {oracle}: off by {off:.2e}");
 }
 
-/// What the script of the documentation says, which reads shots and samples in NumPy by what is written of
-/// their bytes.
+/// The script of the documentation reads shots and samples in NumPy, by the documented layout of their bytes.
 #[test]
 fn samples_are_read_by_what_is_written_of_them() {
     let desk = Desk::new();
@@ -70,7 +69,7 @@ fn samples_are_read_by_what_is_written_of_them() {
     let header_and_blocks = 128 + 16 * said["blocks"].as_u64().unwrap();
     let bytes = fs::metadata(desk.path().join("out").join(files[1])).unwrap().len();
     assert_eq!(header_and_blocks + 2 * said["codes"].as_u64().unwrap(), bytes);
-    // Of a wall square on, all shots are within 0.1 % of the distance; a tick is 6 cm.
+    // All shots at a wall square on are within 0.1 % of the distance; a tick is 6 cm.
     let points = fs::read_to_string(desk.path().join("out/scan-000000.csv")).unwrap();
     let ranges: Vec<f64> = points
         .lines()
@@ -156,7 +155,7 @@ mod counting {
     const NARROW: &str = "--set scan.raster.horizontal_deg=0.2 --set scan.raster.vertical_deg=0.2 \
                           --set scan.raster.rows=8 --environment vacuum-dark --format ticks-csv --json";
 
-    /// Ticks of the file in `folder` before so many seconds have passed.
+    /// Counts the ticks of the file in `folder` in the first `lasts` seconds.
     fn ticks(desk: &Desk, folder: &str, lasts: f64) -> f64 {
         let file = desk.path().join(folder).join("ticks-000000.csv");
         let text = fs::read_to_string(file).unwrap();
@@ -246,7 +245,7 @@ mod counting {
         assert!((seen + (-photons / 2.0).exp_m1()).abs() > four);
     }
 
-    /// As many counts as the cells could bear between them, and ten times as many.
+    /// Two rates of counts: the most that the cells can bear between them, and ten times that.
     #[test]
     fn cells_saturate_as_renewal_has_it() {
         let desk = Desk::new();
@@ -270,7 +269,7 @@ mod counting {
             let mut drawn = given;
             (drawn["lasts_s"], drawn["seed"]) = (json!(1e-4), json!(1));
             let drawn = ask(&desk, "fired-drawn", &drawn).as_f64().unwrap();
-            // Cells with a dead time scatter less than Poisson, of which these are four deviations.
+            // Cells with a dead time scatter less than Poisson; the tolerance is four deviations of Poisson.
             assert_near(drawn, law, 4.0 / (law * 1e-4).sqrt());
             // Two firings in a tick of 2.5 ps are one, at half the chance that there are any.
             assert_near(found, law * (1.0 - law * 2.5e-12 / 2.0), 4.0 / (law * lasts).sqrt());

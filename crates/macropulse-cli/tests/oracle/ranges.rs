@@ -34,13 +34,13 @@ fn points(desk: &Desk, cloud: &str) -> Points {
         .collect()
 }
 
-/// What the oracle finds in `shots` and `ticks`, every so many shots.
+/// Returns the ranges that the oracle finds in `shots` and `ticks`, for one shot in `every`.
 fn found(desk: &Desk, shots: &str, ticks: &str, every: u32) -> Vec<Value> {
     let given = json!({ "shots": shots, "ticks": ticks, "every": every });
     ask(desk, "ranges", &given).as_array().unwrap().clone()
 }
 
-/// How many shots of the oracle the program has at the same range, to a tick, by as many marks.
+/// Counts the shots to which program and oracle give the same range, to a tick, and the same number of marks.
 fn agreed(points: &Points, found: &[Value]) -> usize {
     let agrees = |shot: &&Value| {
         let pixel = (shot["row"].as_u64().unwrap(), shot["column"].as_u64().unwrap());
@@ -123,14 +123,13 @@ fn what_stands_out_of_dense_noise_is_found() {
     assert_eq!(agreed(&points, &clear), clear.len());
 }
 
-/// One lag has more marks than any other: those of two pieces of glass, one behind the other, may
-/// have as many.
+/// Returns true if one lag has more marks than any other. Two pieces of glass, one behind the other, may have
+/// equal numbers.
 fn is_clear(shot: &&Value) -> bool {
     shot["lit"].as_u64() > shot["next"].as_u64()
 }
 
-/// What is wrong with the files is noticed: ticks that come seven ticks late, words of the shots
-/// beside them.
+/// Checks that wrong files are noticed: ticks that come seven ticks late, and words of the shots beside them.
 fn controls(desk: &Desk, points: &Points, (shots, ticks): (&str, &str), both: usize) {
     let edited = |from: &str, to: &str, edit: &dyn Fn(&mut Vec<i64>)| {
         let text = fs::read_to_string(desk.path().join(from)).unwrap();

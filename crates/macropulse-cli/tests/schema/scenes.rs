@@ -1,5 +1,5 @@
-//! What the schema of scenes says of a key, the program checks: its limits, how many entries a list
-//! has, which words there are, which keys must be there and that there are no others.
+//! The program checks all that the schema of scenes says of a key. The schema gives limits, the number of
+//! entries of a list, the possible words and the required keys, and allows no other keys.
 
 use std::fs;
 use std::path::Path;
@@ -8,8 +8,8 @@ use macropulse::environment;
 use macropulse::scene::{Scene, schema};
 use serde_json::{Map, Value, json};
 
-/// Keys of scenes without a fault, so that each key of the schema is in one of them. What cannot
-/// stand together is in several.
+/// Keys of scenes without a fault, so that each key of the schema is in one of them. Keys that cannot stand
+/// together are in several scenes.
 fn scenes() -> Vec<Value> {
     let at = json!([9, 0, 0]);
     let path = || {
@@ -156,7 +156,7 @@ fn places(scene: &Value, path: &str) -> Vec<String> {
     places
 }
 
-/// What is said of `scene`, if it is refused.
+/// Returns the error of `scene`, if it is refused.
 fn said(scene: &Value, folder: &Path) -> Option<String> {
     let text = toml::to_string(scene).unwrap();
     Scene::from_toml(&text, "mine.toml", folder).err().map(|error| error.to_string())
@@ -179,14 +179,14 @@ impl Trial {
     }
 }
 
-/// What is tried of a `rule` in place of `old`, at a place called `key`.
+/// Returns the trials of a `rule` in place of `old`, at a place called `key`.
 fn trials(rule: &Rule, key: &str, old: &Value) -> Vec<Trial> {
     let mut trials = Vec::new();
     match rule {
         Rule::Between(least, most, is_above) => {
             let [low, high] =
                 [least, most].map(|limit| limit.map_or(String::new(), |l| l.to_string()));
-            // Of a velocity it is the length of the arrow that is told.
+            // The message on a velocity tells the length of the arrow.
             let low = if key == "velocity_m_s" { "" } else { &low };
             let told = [key, if *is_above { "above zero" } else { low }, &high];
             let number = |value: f64| match old.is_i64() && value.fract() == 0.0 {

@@ -8,22 +8,22 @@ use super::{CodeWord, Error, Family, Payload};
 /// Most marks a codebook may hold: half a gigabyte of them.
 pub(super) const MOST_MARKS: u64 = 1 << 28;
 
-/// What a 0 bit is sent as; a 1 bit is the code word.
+/// Signal of a 0 bit; a 1 bit is the code word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Keying {
     /// Darkness (NRZ-OOK, \[KP16 §2.2\]).
     #[default]
     OnOff,
-    /// The complement of the code word: sequence-inversion keying. For words of which about half
-    /// the chips are lit.
+    /// The complement of the code word: sequence-inversion keying. It suits words with about half of their
+    /// chips lit.
     Inversion,
 }
 
 /// A family's words times a payload's labels: one template of marks for each pair.
 ///
-/// Bit b of the payload, counted from the one sent first, takes the chips b·length …
-/// (b+1)·length − 1 of the macropulse: a 1 bit is the code word, a 0 bit what the [`Keying`] says.
-/// Both ends of the link own the same codebook.
+/// Bit b of the payload, counted from the one sent first, takes the chips b·length … (b+1)·length − 1 of the
+/// macropulse. A 1 bit is the code word, and the [`Keying`] defines a 0 bit. Both ends of the link own the
+/// same codebook.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Codebook {
     family: Family,
@@ -33,13 +33,13 @@ pub struct Codebook {
     words: Vec<CodeWord>,
     /// Templates one behind the other: all words of label 0, all words of label 1, …
     marks: Vec<u16>,
-    /// Where each template begins in `marks`, and where the last one ends.
+    /// Index in `marks` where each template begins, and where the last one ends.
     starts: Vec<u32>,
     /// The highest sidelobe of each template.
     sidelobes: Vec<u16>,
     /// First chip of each 1 bit: those of label 0, those of label 1, …
     lit: Vec<u32>,
-    /// Where each label begins in `lit`, and where the last one ends.
+    /// Index in `lit` where each label begins, and where the last one ends.
     lit_starts: Vec<u32>,
 }
 
@@ -48,8 +48,8 @@ impl Codebook {
     /// a macropulse is one bare code word, and there is one label, 0.
     ///
     /// # Errors
-    /// Where the payload cannot carry that many labels, or none is asked for; where a macropulse
-    /// is longer than 65535 chips; where all templates together have more than 2²⁸ marks.
+    /// If the payload cannot carry that many labels, or none is asked for. If a macropulse is longer than
+    /// 65535 chips, or all templates together have more than 2²⁸ marks.
     pub fn new(
         family: Family,
         payload: Option<Payload>,
@@ -153,8 +153,8 @@ impl Codebook {
         &self.lit[self.lit_starts[label] as usize..self.lit_starts[label + 1] as usize]
     }
 
-    /// Most of its own marks that the macropulse of `label` in `word` meets when it is shifted by
-    /// less than a code word: the peak that is nearest to the right one in height and in time.
+    /// Returns the largest number of its own marks that the macropulse of `label` in `word` meets, shifted by
+    /// less than a code word. That peak is the nearest to the right one in height and in time.
     ///
     /// # Panics
     /// Like a slice, where `label` or `word` is not in the book.
@@ -190,7 +190,7 @@ impl Codebook {
         self.payload.as_ref()
     }
 
-    /// Whether a 0 bit sends light, too: the complement of the code word.
+    /// Returns true if a 0 bit sends light, too: the complement of the code word.
     pub fn zeros_are_lit(&self) -> bool {
         self.keying == Keying::Inversion
     }
@@ -233,13 +233,13 @@ impl Codebook {
     }
 }
 
-/// What the bits of a macropulse look like in one code word.
+/// Shapes of the bits of a macropulse in one code word.
 struct Shapes {
     /// A 0 bit and a 1 bit; `None` where it is dark.
     bits: [Option<CodeWord>; 2],
-    /// What each shares with itself at each positive lag, if it is not dark.
+    /// Marks that each bit shares with itself at each positive lag, if it is not dark.
     alone: [Vec<u16>; 2],
-    /// What each shares at each positive lag with each of them that follows it.
+    /// Marks that each bit shares at each positive lag with each bit that follows it.
     follower: [[Vec<u16>; 2]; 2],
     /// The highest sidelobes of macropulses so far.
     highest: HashMap<BitCounts, u16>,

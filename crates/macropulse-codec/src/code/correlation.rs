@@ -67,7 +67,7 @@ pub fn aperiodic(a: &CodeWord, b: &CodeWord) -> Aperiodic {
     Aperiodic { length, coincidences }
 }
 
-/// Whether two words of `length` chips have so many marks that to count them in bits takes fewer steps.
+/// Returns true if two words of `length` chips have enough marks for counting in bits to take fewer steps.
 fn are_dense(a: &CodeWord, b: &CodeWord, length: u32) -> bool {
     let pairs = a.weight() as u64 * b.weight() as u64;
     let is_within = |word: &CodeWord| word.marks.iter().all(|mark| u32::from(*mark) < length);
@@ -84,7 +84,7 @@ fn in_bits(a: &CodeWord, lit: impl Iterator<Item = usize>, lags: u32) -> Vec<u16
     counts
 }
 
-/// So many bits, of which those at `places` are set.
+/// Returns `length` bits, with those at `places` set.
 fn bits(places: impl Iterator<Item = usize>, length: usize) -> Vec<u64> {
     let mut words = vec![0_u64; length.div_ceil(64)];
     for place in places {

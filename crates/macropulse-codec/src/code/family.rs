@@ -146,8 +146,9 @@ impl Family {
     /// Words whose marks are drawn at random, each by (seed, index of the word).
     ///
     /// # Errors
-    /// Where the length is not 1 to 65535, the weight not 1 to the length, the number of words not
-    /// 1 to 65535, or the gap 0 or so wide that the marks do not fit into the word.
+    /// If the length or the number of words is not 1 to 65535, or the weight not 1 to the length. If all
+    /// words together have more than 2²⁸ marks. If the gap is 0, or so wide that the marks do not fit into
+    /// the word.
     pub fn sparse(sparse: Sparse) -> Result<Self, Error> {
         sparse::checked(&sparse)?;
         Ok(Self::Sparse(sparse))
@@ -167,8 +168,8 @@ impl Family {
     /// The words of `length` chips that are lit at `marks`: for each word its chips, counted from 0.
     ///
     /// # Errors
-    /// Where the length is not 1 to 65535 or the number of words not 1 to 65535; where a word has no marks,
-    /// or they do not ascend, or one lies beyond the length; where two words are the same.
+    /// If the length or the number of words is not 1 to 65535. If a word has no marks, or they do not ascend,
+    /// or one lies beyond the length. If two words are the same.
     pub fn listed(length: u32, marks: Vec<Vec<u32>>) -> Result<Self, Error> {
         listed::words(length, marks).map(|words| Self::Listed { words })
     }

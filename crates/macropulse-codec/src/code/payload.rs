@@ -19,7 +19,7 @@ pub struct Crc {
     pub width: u8,
     /// Coefficients below the leading term, which is implied: x³ + x + 1 is `0b011`.
     pub polynomial: u8,
-    /// What the register holds before the first bit.
+    /// Value of the register before the first bit.
     pub init: u8,
 }
 
@@ -80,11 +80,11 @@ pub enum PayloadFault {
 /// A label that is taken for another one when its leading dark bits are overlooked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ShiftAlias {
-    /// What was sent.
+    /// Label that was sent.
     pub label: u16,
     /// Dark bits before the first lit one.
     pub leading_zeros: u32,
-    /// What is read from the first lit bit on, with a checksum that fits.
+    /// Label that is read from the first lit bit on, with a checksum that fits.
     pub read_as: u16,
 }
 
@@ -93,8 +93,8 @@ impl Payload {
     /// always lit goes first.
     ///
     /// # Errors
-    /// Where the label has not 1 to 16 bits; where the checksum has not 1 to 8, its polynomial or
-    /// initial value do not fit, or its polynomial lacks the term 1.
+    /// If the label has not 1 to 16 bits, or the checksum not 1 to 8. If the polynomial or the initial value
+    /// of the checksum does not fit, or the polynomial lacks the term 1.
     pub fn new(label_bits: u32, crc: Crc, sync: bool) -> Result<Self, Error> {
         if !(1..=16).contains(&label_bits) {
             return Err(Error::LabelBits { bits: label_bits });
@@ -161,7 +161,7 @@ impl Payload {
         self.encode(label).count_ones()
     }
 
-    /// Whether `label` makes no light at all.
+    /// Returns true if `label` makes no light at all.
     pub fn is_dark(&self, label: u16) -> bool {
         self.encode(label) == 0
     }

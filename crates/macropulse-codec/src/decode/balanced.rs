@@ -435,11 +435,10 @@ mod tests {
         assert!(returns.margin.iter().all(|&margin| margin > 30), "{:?}", returns.margin);
     }
 
-    /// H0: where nothing is, light that is always there leaves the balance at the (marks − dark
-    /// chips)·d of its level d, which is next to nothing, while it lifts a count of marks by
-    /// marks·d. N = 400 shots of 127 chips, seed 5, d = 0.25; the balance has a standard error of
-    /// √(127·d·(1 − d)/400) = 0.24, the count one of 0.17; α = 10⁻⁴ is 3.9 of them. The count is
-    /// the negative control.
+    /// H0: where nothing is, light that is always there leaves the balance at (marks − dark chips)·d of its
+    /// level d. That is next to nothing, while it lifts a count of marks by marks·d. N = 400 shots of 127
+    /// chips, seed 5, d = 0.25. The balance has a standard error of √(127·d·(1 − d)/400) = 0.24, the count
+    /// one of 0.17. α = 10⁻⁴ is 3.9 of them. The count is the negative control.
     #[test]
     fn a_constant_level_lifts_a_count_but_not_the_balance() {
         let book = &books()[1];

@@ -312,9 +312,9 @@ pub(super) trait Light {
 
 /// Takes from `light` the returns of `hypotheses`, and of all that it proposes.
 ///
-/// Each round judges all hypotheses, the fullest first. So the verdict on a hypothesis depends on fuller ones alone, and
-/// not on the order in which they came; what was judged before the first new one need not be judged again. Then `light`
-/// proposes more of what is left, until it has no new one.
+/// Each round judges all hypotheses, the fullest first. So the verdict on a hypothesis depends on fuller ones
+/// alone, and not on the order in which they came. Hypotheses before the first new one need not be judged
+/// again. Then `light` proposes more of what is left, until it has no new one.
 ///
 /// **It ends.** Every round but the last one adds a pair of shot and lag to those that `light` has proposed. It proposes
 /// none of them twice, and there are finitely many. A return that is taken back stays a hypothesis: it is judged again.

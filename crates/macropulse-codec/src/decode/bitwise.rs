@@ -1,8 +1,8 @@
 //! The literal and the blind receiver: one bit after the other, without knowing what was sent.
 //!
 //! 1. The earliest tick that belongs to no macropulse yet opens one.
-//! 2. A tick at the place of mark 1, 2 or 3 of a code word proposes that word; the proposed word
-//!    with the greatest share of its marks there is taken, if they are enough for a 1 bit.
+//! 2. A tick at the place of mark 1, 2 or 3 of a code word proposes that word. The proposed word with the
+//!    greatest share of its marks there is taken, if they are enough for a 1 bit.
 //! 3. Each further stretch of one word's length is a 1 bit if enough marks of the word are there.
 //! 4. The checksum must fit, and a shot with that label and that word must be in flight.
 //! 5. The ticks of the macropulse are taken off the queue, accepted or not.
@@ -70,7 +70,7 @@ pub(super) fn decode(
 /// Opening ticks for which all that may be of their macropulses is at hand together, in ticks.
 const STRETCH: i64 = 1 << 16;
 
-/// What was read from an opening tick on.
+/// A macropulse as it is read from an opening tick on.
 struct Macropulse {
     /// First tick of the first lit bit.
     start: i64,
@@ -86,7 +86,8 @@ struct Claim {
     count: u16,
 }
 
-/// One of so many marks behind the first one must be found before the others are looked for.
+/// Number of marks behind the first one that are looked for first; the others are looked for only if one of
+/// these is found.
 const PROPOSALS: usize = 3;
 
 /// Machine words of ticks in which they are looked for at once.
@@ -117,7 +118,7 @@ struct Band<'a> {
     words: Vec<Vec<i64>>,
     /// The same as bits.
     patterns: Vec<Pattern>,
-    /// The places of each word, from so many ticks before its start on, at which its ticks may be.
+    /// The places of each word at which its ticks may be, from `slack` ticks before its start on.
     around: Vec<Pattern>,
     /// For each word, which of the ticks from its first mark on are its next three marks; `None`
     /// where these are farther.
@@ -151,7 +152,7 @@ impl<'a> Band<'a> {
         };
         let words: Vec<Vec<i64>> = (0..codebook.words()).map(in_ticks).collect();
         let bits = codebook.payload().map_or(1, |payload| payload.bits());
-        // Both the opening tick and the mark jitter: √2 σ between them, of which 2 σ are allowed.
+        // Both the opening tick and the mark jitter: by √2 σ against each other. Twice that is allowed.
         let jitter = settings.jitter_ticks.min(MOST_JITTER);
         let slack = if jitter > 0.05 { (8_f64.sqrt() * jitter).ceil() as u32 } else { 0 };
         let width = 2 * slack + 1;
@@ -245,7 +246,7 @@ impl<'a> Band<'a> {
                         best = Some((shot, claim, dark));
                     }
                 }
-                // What got furthest tells most.
+                // The reason that got furthest tells most.
                 Err(why) if rank(why) > rank(reject) => reject = why,
                 Err(_) => {}
             }
@@ -318,8 +319,8 @@ impl<'a> Band<'a> {
         self.runner_up[shot] = self.runner_up[shot].max(runner_up);
     }
 
-    /// Whether a macropulse that belongs to no shot is counted here: each one in one band only,
-    /// that whose owned shots are fired while it comes.
+    /// Returns true if a macropulse that belongs to no shot is counted here. Each one is counted in one band
+    /// only: the one whose owned shots are fired while it comes.
     fn is_owned(&self, start: i64) -> bool {
         let nearest = i64::from(self.receiver.gate_ticks.0);
         let fired = |shot: usize| self.fired.get(shot).map(|fired| fired + nearest);

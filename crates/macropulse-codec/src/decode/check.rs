@@ -1,4 +1,4 @@
-//! What a receiver must be given; all else is refused before it is looked at.
+//! Requirements on the input of a receiver; all else is refused before it is looked at.
 
 use std::ops::Range;
 
@@ -11,8 +11,8 @@ use crate::{Record, Samples, ShotLog, Ticks};
 /// of a code word are kept several times, 2 MB each at this length.
 const LONGEST: u64 = 1 << 24;
 
-/// Ticks over which light may be looked for, with the length of a macropulse. The matched receiver
-/// keeps as many as thirty-two bits for each: 270 MB.
+/// Ticks over which light may be looked for, with the length of a macropulse. The matched receiver keeps up
+/// to thirty-two bits for each: 270 MB.
 const FARTHEST: u64 = 1 << 26;
 
 /// How far from the epoch of the ticks a shot may be fired, in ticks: as far as these are counted.
@@ -110,8 +110,8 @@ fn sampling(sampling: &Sampling) -> Result<(), Error> {
     require(least_marks > 0, "sampling.least_marks", &least_marks, "1 or more")
 }
 
-/// Refuses a range gate whose lags cannot all be told one by one: a receiver that takes the first ticks
-/// as they come needs no memory for them, and its explanation does.
+/// Refuses a range gate whose lags cannot all be told one by one. A receiver that takes the first ticks as
+/// they come needs no memory for them, and its explanation does.
 pub(super) fn check_lags(receiver: &Receiver) -> Result<(), Error> {
     let (what, ticks) = ("a time of flight that is explained", u64::from(receiver.gate_ticks.1));
     match ticks > FARTHEST {
@@ -184,7 +184,7 @@ fn of_ticks(receiver: &Receiver, ticks: &Ticks) -> Result<(), Error> {
     Ok(())
 }
 
-/// Refuses `ticks` of which those at some `places` do not ascend.
+/// Refuses `ticks` if those at `places` do not ascend.
 pub(super) fn in_order(ticks: &[u32], places: Range<usize>) -> Result<(), Error> {
     let (begin, some) = (places.start, &ticks[places]);
     if ascends(some) {
@@ -222,7 +222,7 @@ fn in_codebook(log: &ShotLog, codebook: &Codebook) -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether all times can be counted: those of light in femtoseconds, and of shots in ticks.
+/// Checks that all times can be counted: those of light in femtoseconds, and of shots in ticks.
 fn in_time(
     receiver: &Receiver,
     (codebook, log): (&Codebook, &ShotLog),

@@ -62,7 +62,7 @@ mod tests {
         keep((1, Pick::First), log, ticks)
     }
 
-    /// Decodes with so many returns at most, and which of them.
+    /// Decodes with `returns` returns at most, chosen by `pick`.
     fn keep((returns, pick): (u8, Pick), log: &ShotLog, ticks: &Ticks) -> Returns {
         let receiver = Receiver {
             tick_fs: 1_000_000,
@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(kept(2, Pick::Strongest), [3.0, 4.0]);
         assert_eq!(kept(1, Pick::Strongest), [4.0]);
         assert_eq!(keep((3, Pick::Last), &log, &ticks).number, [1, 2, 3]);
-        // Where no amplitude is measured all are as strong: the nearest.
+        // Without amplitudes all are as strong: the nearest are kept.
         let unmeasured = Ticks { amplitude: vec![], ..ticks.clone() };
         let nearest = keep((2, Pick::Strongest), &log, &unmeasured);
         assert_eq!(nearest.tof, keep((2, Pick::First), &log, &ticks).tof);

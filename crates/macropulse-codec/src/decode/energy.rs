@@ -13,10 +13,10 @@ impl Energy {
     /// The energy of a return with `peak` of its `marks` found, where a share `density` of all places is
     /// lit by chance.
     ///
-    /// A share p = (k/N − d)/(1 − d) of the marks shows a photon at least in the `window` they are
-    /// looked for in, which holds a share c of what they make. Where each makes one event, p/c of them
-    /// do, and μ = −ln(1 − p/c) photons were detected on average (Poisson); where each photon makes one,
-    /// μ = −ln(1 − p)/c. From N − ½ marks on the count tells no more: μ is a lower bound.
+    /// A share p = (k/N − d)/(1 − d) of the marks shows a photon at least in the `window` they are looked for
+    /// in. The window holds a share c of what they make. If each mark makes one event, p/c of them do, and on
+    /// average μ = −ln(1 − p/c) photons were detected (Poisson). If each photon makes one, μ = −ln(1 − p)/c.
+    /// From N − ½ marks on the count tells no more: μ is a lower bound.
     pub fn of((peak, marks): (u32, u32), density: f64, window: Window) -> Self {
         let all = f64::from(marks);
         let most = (all - 0.5) / all;

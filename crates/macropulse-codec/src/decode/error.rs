@@ -1,7 +1,7 @@
 //! Why a receiver cannot decode what it is given.
 
-/// What is given to a receiver breaks what was agreed: one sentence with what is wrong and what to
-/// do. Light that cannot be decoded is no error, it is counted in [`Returns`](super::Returns).
+/// Input of a receiver that breaks what was agreed: one sentence with what is wrong and what to do. Light
+/// that cannot be decoded is no error; it is counted in [`Returns`](super::Returns).
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -10,9 +10,9 @@ pub enum Error {
     Setting {
         /// Its name.
         setting: &'static str,
-        /// What it is.
+        /// Its value.
         value: String,
-        /// What it may be, as the end of the sentence.
+        /// Possible values, as the end of the sentence.
         possible: &'static str,
     },
     /// The range gate ends before it begins.
@@ -32,7 +32,7 @@ pub enum Error {
          use longer ticks or a shorter one"
     )]
     TooLong {
-        /// What is so long, with its article.
+        /// Name of the thing that is too long, with its article.
         what: &'static str,
         /// How long it is, in ticks.
         ticks: u64,
@@ -51,9 +51,9 @@ pub enum Error {
         length: usize,
         /// How long it should be.
         wanted: usize,
-        /// What an entry belongs to, in the plural.
+        /// Things that have an entry each, in the plural.
         of: &'static str,
-        /// What else may be given, as the end of the sentence.
+        /// Alternative to the entries, as the end of the sentence.
         or: &'static str,
     },
     /// The ticks of a channel do not ascend.
@@ -141,9 +141,9 @@ pub enum Error {
     /// A receiver of one kind of record was given another one.
     #[error("this receiver decodes {wants}, and is given {given}: use a receiver of {given}")]
     Record {
-        /// What it decodes.
+        /// Kind of record that it decodes.
         wants: &'static str,
-        /// What it is given.
+        /// Kind of record that it is given.
         given: &'static str,
     },
     /// The channels of samples do not ascend.
@@ -159,7 +159,7 @@ pub enum Error {
         /// The channel before it.
         before: u16,
     },
-    /// The channels do not have as many samples each.
+    /// The channels do not all have the same number of samples.
     #[error(
         "{codes} samples are not as many of each of {channels} channels: give all channels samples \
          of the same moments"

@@ -1,9 +1,9 @@
 //! Why a shot was decided as it was.
 //!
-//! The verdict is the receiver's: the band is decoded again, by the same code, with that shot as the
-//! last one that is owned, and what came of those before it is taken off. Beside it stands how many marks are found at
-//! every lag, and for which light other shots account: both are counted from the ticks in the plainest way, mark by mark.
-//! Odds are those of the thorough receiver.
+//! The verdict is the receiver's. The same code decodes the band again, once with that shot as the last owned
+//! one and once without it. The difference is the verdict. The explanation also counts the marks found at
+//! every lag, and tells which light other shots account for. Both follow from the ticks in the plainest way,
+//! mark by mark. Odds are those of the thorough receiver.
 
 use std::ops::Range;
 
@@ -55,12 +55,12 @@ pub struct Explanation {
     pub others: Vec<OtherLight>,
 }
 
-/// What the receiver decided of a shot.
+/// The decision of the receiver on a shot.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Verdict {
     /// Its returns, the nearest first.
     pub returns: Vec<Accepted>,
-    /// What was refused, and how often.
+    /// Reasons of refusal, and how often each occurred.
     pub rejects: Vec<(Reject, u64)>,
 }
 
@@ -88,7 +88,7 @@ pub struct OtherLight {
     pub begins: i64,
     /// Marks of it that are found, all of them in the time of the explained shot.
     pub marks: u32,
-    /// Of these, marks at places where the explained shot has one at its peak.
+    /// Those of `marks` at places where the explained shot has a mark at its peak.
     pub shared: u32,
 }
 

@@ -12,9 +12,11 @@ const MARGIN: i64 = 2048;
 /// Ticks that are laid down together: as bits they fit into a first-level cache.
 const PIECE: i64 = 1 << 16;
 
-/// The ticks of a stretch, one bit each, three times: as they came; lit wherever a mark counts as
-/// found, which is at a tick and at the `width` − 1 places before it; and the residual, the ticks
-/// that are left when those of the macropulses found so far are cancelled.
+/// The ticks of a stretch as three rows of bits.
+///
+/// - `seen`: the ticks as they came.
+/// - `lit`: the places at which a mark counts as found, a tick and the `width` − 1 places before it.
+/// - `residual`: the ticks that are left when those of the macropulses found so far are cancelled.
 #[derive(Debug)]
 pub(super) struct Field<'a> {
     ticks: &'a [u32],

@@ -93,8 +93,8 @@ pub struct Correlation {
     /// Standard deviation of the timing of one detection event, in ticks: how far from its place a
     /// mark is looked for.
     pub jitter_ticks: f64,
-    /// Each photon of a mark makes an event at a time of its own, instead of the mark making one: then
-    /// one of many comes nearly always where the mark is looked for.
+    /// True if each photon of a mark makes an event at a time of its own, instead of the mark making one.
+    /// Then one of many comes nearly always where the mark is looked for.
     pub photons_apart: bool,
     /// False returns accepted per shot; the threshold follows from it.
     pub false_alarm: f64,
@@ -279,13 +279,13 @@ const MARGIN: i64 = 2048;
 /// Place in its tick at which light comes that only one tick shows.
 const MIDDLE: f64 = 0.5;
 
-/// The most jitter that is decoded as such, in ticks: a mark is looked for 2 σ to both sides of its place,
-/// and the ticks that are looked at are limited thereby.
+/// The most jitter that is decoded as such, in ticks. A mark is looked for 2 σ to both sides of its place, so
+/// this limits the ticks that are looked at.
 const MOST_JITTER: f64 = 255.0;
 
 impl Receiver {
-    /// A matched receiver of ticks of `tick_fs` femtoseconds, a chip to a tick, timed exact to the
-    /// tick, a gate from 0 to 100 000 ticks, and one false return in a million shots accepted.
+    /// Returns a matched receiver of ticks of `tick_fs` femtoseconds. It has a chip to a tick, timing exact
+    /// to the tick, a gate from 0 to 100 000 ticks, and accepts one false return in a million shots.
     pub fn matched(tick_fs: i64) -> Self {
         Self {
             tick_fs,
@@ -305,8 +305,9 @@ impl Receiver {
         check::settings(self, codebook)
     }
 
-    /// The lags at which a receiver that correlates ticks looks for light of macropulses of `length` ticks: those of the
-    /// gate, and all beyond it from which light may come, a macropulse farther at least.
+    /// Returns the lags at which a receiver that correlates ticks looks for light of macropulses of `length`
+    /// ticks. These are the lags of the gate, and all beyond it from which light may come, a macropulse
+    /// farther at least.
     pub fn lags_of_light(&self, correlation: &Correlation, length: i64) -> Range<i64> {
         let (nearest, farthest) = self.gate_ticks;
         let end = i64::from(correlation.light_ticks).max(i64::from(farthest) + length) + 1;
@@ -318,20 +319,20 @@ impl Receiver {
         window(self.method.jitter_ticks())
     }
 
-    /// The returns of the owned shots of `log`, out of the `record` of its band: all its ticks, samples,
-    /// histograms, taps or beats; ordered by shot, those of one shot by range.
+    /// Decodes the owned shots of `log` out of the `record` of its band: all its ticks, samples, histograms,
+    /// taps or beats. The returns are ordered by shot, those of one shot by range.
     ///
-    /// The record must cover the whole time in which light of an owned shot can arrive. Guard shots
-    /// are decoded too, as their light overlaps, and dropped. Each channel is decoded by itself;
-    /// labels and words must be in the `codebook`.
+    /// The record must cover the whole time in which light of an owned shot can arrive. Guard shots are
+    /// decoded too, as their light overlaps, and dropped. Each channel is decoded by itself; labels and words
+    /// must be in the `codebook`.
     ///
-    /// A tick t of length τ is taken for the time (t + ½)·τ, so that rounding down to whole ticks
-    /// does not bring everything nearer; a sample is of the time t·τ.
+    /// A tick t of length τ is taken for the time (t + ½)·τ, so that rounding down to whole ticks does not
+    /// bring everything nearer. A sample is of the time t·τ.
     ///
     /// # Errors
-    /// If what is given cannot be decoded by any receiver: a record of another kind,
-    /// columns of unequal length, ticks or shots out of order, shots that are not in the codebook, times that are not counted, settings out of
-    /// their limits. Light in which nothing is found is no error.
+    /// If the record cannot be decoded by any receiver: it is of another kind, columns differ in length, or
+    /// ticks or shots are out of order. Also if shots are not in the codebook, times are not counted, or
+    /// settings are out of their limits. Light in which nothing is found is no error.
     pub fn decode<'a>(
         &self,
         codebook: &Codebook,
@@ -432,8 +433,8 @@ impl Receiver {
 
     /// The ticks in which the shots were fired, from tick `epoch` on.
     fn fired_since(&self, log: &ShotLog, epoch: i64) -> Vec<i64> {
-        // Whole numbers up to here are exact as floating-point ones, and a quotient of two is
-        // wrong by one at most; a division of whole numbers takes several times as long.
+        // Whole numbers up to here are exact as floating-point ones, and a quotient of two is wrong by one at
+        // most. A division of whole numbers takes several times as long.
         const EXACT: i64 = 1 << 52;
         let Some(&first) = log.fired_at_fs.first() else { return Vec::new() };
         let (start, rest) = (first.div_euclid(self.tick_fs), first.rem_euclid(self.tick_fs));
@@ -449,8 +450,9 @@ impl Receiver {
         log.fired_at_fs.iter().map(ticks).collect()
     }
 
-    /// Two-way time of flight, s, of light that left at one time, fs, and came `late` ticks after a tick
-    /// began, by these two: half a tick, where no more is known.
+    /// Returns a function that gives the two-way time of flight, s, by the time at which light left, fs, and
+    /// the tick in which it came. It came `late` ticks after that tick began: half a tick, if no more is
+    /// known.
     fn tof(&self, late: f64) -> impl Fn(i64, i64) -> f64 + use<> {
         let (tick_fs, late) = (self.tick_fs, late * time::s_from_fs(self.tick_fs));
         move |fired_at_fs, tick| time::s_from_fs(tick * tick_fs - fired_at_fs) + late

@@ -12,14 +12,14 @@ pub const MOST_RETURNS: u8 = 8;
 pub enum Pick {
     /// The nearest.
     First,
-    /// The one with most marks, or the most light where these are as many; of several the nearest.
+    /// The one with most marks; among equals the one with most light, then the nearest.
     #[default]
     Strongest,
     /// The farthest.
     Last,
 }
 
-/// What decides among returns of one shot.
+/// The strength of a return, which decides among those of one shot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strength {
     /// Marks found.
@@ -29,7 +29,7 @@ pub struct Strength {
 }
 
 impl Strength {
-    /// Whether it is stronger than `other`.
+    /// True if it is stronger than `other`.
     pub fn exceeds(self, other: Self) -> bool {
         self.peak > other.peak || (self.peak == other.peak && self.light > other.light)
     }
@@ -45,7 +45,7 @@ impl Pick {
         }
     }
 
-    /// Whether a return that is `next` is picked before one that is not farther, `before`.
+    /// True if a return that is `next` is picked before one that is not farther, `before`.
     pub fn prefers(self, next: Strength, before: Strength) -> bool {
         match self {
             Self::First => false,
@@ -67,7 +67,7 @@ impl Pick {
             Self::Last => drop(found.drain(..excess)),
             Self::Strongest => {
                 for _ in 0..excess {
-                    // Of equally weak ones the farthest goes.
+                    // The farthest of equally weak ones goes.
                     let weaker = |worst: usize, next: usize| match strength(&found[next])
                         .exceeds(strength(&found[worst]))
                     {

@@ -1,4 +1,4 @@
-//! What decoding gives: the seam between the receiver and the points.
+//! The results of decoding: the seam between the receiver and the points.
 
 /// Why a shot or a found macropulse gave no return. Counted, never an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -32,9 +32,8 @@ impl Reject {
     }
 }
 
-/// Decoded measurements of the owned shots of a band, as columns, ordered by shot, then by time of
-/// flight; and the count of what was rejected. A shot has as many as [`super::Receiver::returns`] at
-/// most.
+/// Decoded measurements of the owned shots of a band, as columns, ordered by shot, then by time of flight;
+/// and the count of what was rejected. A shot has [`super::Receiver::returns`] measurements at most.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Returns {
     /// Index of the shot in the band's log.
@@ -53,7 +52,7 @@ pub struct Returns {
     /// Energy as the receiver can tell it, in detected photons per mark: measured, or by the count of
     /// the marks found as of a detector that every photon fires.
     pub photons: Vec<f32>,
-    /// Whether `photons` is a lower bound: no mark was missed, and no amplitude measured, or samples were
+    /// True if `photons` is a lower bound: no mark was missed, and no amplitude measured, or samples were
     /// clipped.
     pub saturated: Vec<bool>,
     /// Radial velocity, m/s, positive of a surface that approaches; empty of a receiver that measures none.
@@ -80,7 +79,7 @@ impl Returns {
         self.shot.len()
     }
 
-    /// Whether there is no return at all.
+    /// True if there is no return at all.
     pub fn is_empty(&self) -> bool {
         self.shot.is_empty()
     }

@@ -3,9 +3,9 @@
 use super::belief::{Marks, evidence_at};
 use crate::statistics::binomial_tail;
 
-/// The fewest marks that chance does not reach: the smallest k with
-/// L · P(Bin(N, d) ≥ k) ≤ α, where L is the number of `lags` tried, N the number of `marks`,
-/// d the `density` of lit places and α the false alarms accepted. N + 1 where no k will do.
+/// Returns the fewest marks that chance does not reach: the smallest k with L · P(Bin(N, d) ≥ k) ≤ α. L is
+/// the number of `lags` tried, N the number of `marks`, d the `density` of lit places and α the false alarms
+/// accepted. The result is N + 1 if no k will do.
 pub(super) fn least_marks(lags: f64, marks: u32, density: f64, false_alarm: f64) -> u32 {
     fewest(marks, |least| {
         lags * binomial_tail(marks as usize, density, least as usize) <= false_alarm
@@ -34,12 +34,12 @@ pub(super) struct Thresholds {
     known: Vec<Option<Box<Known>>>,
 }
 
-/// What is known of a number of marks.
+/// Thresholds known for a number of marks.
 #[derive(Debug, Clone)]
 struct Known {
     /// By step of density; 0 where not yet known.
     at_step: [u32; STEPS],
-    /// The density up to which so many marks are enough; NaN where not yet known.
+    /// By number of marks, the density up to which they are enough; NaN if not yet known.
     enough_to: Vec<f64>,
 }
 
@@ -55,7 +55,7 @@ impl Thresholds {
         Self { lags, false_alarm, known: Vec::new() }
     }
 
-    /// Whether it gives what `other` gives.
+    /// True if it gives the same thresholds as `other`.
     pub fn is_as(&self, other: &Self) -> bool {
         (self.lags, self.false_alarm) == (other.lags, other.false_alarm)
     }
@@ -81,7 +81,7 @@ impl Thresholds {
             *at_step = least_marks(lags, marks, density, false_alarm);
         }
         let mut least = *at_step;
-        // At the end of the step so many are needed; here fewer may do.
+        // At the end of the step this number is needed; here fewer may do.
         while least > 1 {
             let enough_to = &mut known.enough_to[least as usize - 1];
             if enough_to.is_nan() {
@@ -105,12 +105,12 @@ pub(super) struct Fewest {
 }
 
 impl Fewest {
-    /// For so much evidence, in nats.
+    /// Thresholds for evidence of `needed` nats.
     pub fn new(needed: f64) -> Self {
         Self { needed, known: Vec::new() }
     }
 
-    /// Whether it gives what `other` gives.
+    /// True if it gives the same thresholds as `other`.
     pub fn is_as(&self, other: &Self) -> bool {
         self.needed == other.needed
     }
@@ -133,8 +133,8 @@ impl Fewest {
     }
 }
 
-/// The fewest of `marks` whose evidence against chance of this `density` reaches so many nats; one more than there are if
-/// none do.
+/// Returns the fewest of `marks` whose evidence against chance of this `density` reaches the nats `needed`;
+/// one more than there are if none do.
 fn fewest_with_evidence(marks: u32, density: f64, needed: f64) -> u32 {
     fewest(marks, |lit| evidence_at(Marks { lit, of: marks }, density) >= needed)
 }

@@ -6,22 +6,21 @@
 //!
 //! > P_k(θ) = Φ((k + 1 − θ)/σ) − Φ((k − θ)/σ),
 //!
-//! rounding down being part of it. Other ticks, of noise and of other shots, light a share d of all
-//! places, and where another mark of the same macropulse is D ticks away from a share a_D of the
-//! marks, its ticks are counted, too. So the counts have the means
+//! rounding down being part of it. Other ticks, of noise and of other shots, light a share d of all places.
+//! If another mark of the same macropulse is D ticks away from a share a_D of the marks, its ticks are
+//! counted, too. So the counts have the means
 //!
 //! > λ_k(θ) = N·(d + q·Σ_D a_D·P_{k−D}(θ)), a_0 = 1,
 //!
-//! with the share q of the marks that are seen. θ is the maximum of the likelihood of such a
-//! histogram, ℓ = Σ_k (h_k·ln λ_k − λ_k) \[BC84\], reached by Fisher's scoring: steps of
-//! Σ_k (h_k/λ_k − 1)·s_k / Σ_k s_k²/λ_k, s_k = N·q·∂P_k/∂θ. Each tick counts so far as it is an own
-//! one: by q·P_k·N/λ_k of it. Of neighbours it is known where they are, but nothing is learnt from
-//! them: only some of their ticks are counted, and how many depends on a jitter that is known as its
-//! largest value.
+//! with the share q of the marks that are seen. θ is the maximum of the likelihood of such a histogram,
+//! ℓ = Σ_k (h_k·ln λ_k − λ_k) \[BC84\]. Fisher's scoring reaches it by steps of
+//! Σ_k (h_k/λ_k − 1)·s_k / Σ_k s_k²/λ_k, s_k = N·q·∂P_k/∂θ. Each tick counts so far as it is an own one: by
+//! q·P_k·N/λ_k of it. The places of neighbours are known, but nothing is learnt from them. Only some of their
+//! ticks are counted, and how many depends on a jitter that is known as its largest value.
 //!
-//! The mean of the ticks within a window would be drawn to its middle by ticks of others, to
-//! neighbouring marks by theirs, and, where jitter is below a third of a tick, to the middle of the
-//! tick by rounding.
+//! Ticks of others would draw the mean of the ticks within a window to its middle, and ticks of neighbouring
+//! marks would draw it to these. If jitter is below a third of a tick, rounding would draw it to the middle
+//! of the tick.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -33,16 +32,15 @@ use crate::statistics::{normal_quantile, normal_tail};
 /// nearly all ticks are in one place.
 const MOST_STEPS: usize = 12;
 
-/// A step shorter than this, in ticks, is the last one. What is still missing behind it is about its
-/// square.
+/// A step shorter than this, in ticks, is the last one. The error left behind it is about its square.
 const SHORT: f64 = 1e-2;
 
-/// Least share of places that other ticks are taken to light: a stretch too short to have any does
-/// not tell that there can be none, and one tick far off must not outweigh all others.
+/// Least share of places that other ticks are taken to light. A stretch too short to have any does not tell
+/// that there can be none, and one tick far off must not outweigh all others.
 const FEWEST_OTHERS: f64 = 1e-3;
 
-/// Least information on θ, per square tick, from which a step is made: where all ticks are in one
-/// place and the jitter is small, they tell nothing of where in it.
+/// Least information on θ, per square tick, from which a step is made. If all ticks are in one place and the
+/// jitter is small, they tell nothing of where in it.
 const LEAST_INFORMATION: f64 = 1.0;
 
 /// The knowledge of a receiver about the ticks of a macropulse.
@@ -78,11 +76,13 @@ pub(super) struct Histogram {
 
 impl Histogram {
     /// Makes it that of a macropulse which is found at the earliest of `width` ticks that hold its marks.
-    /// `count` is given a number of ticks and counts to fill in: of those so late, of those one tick later, and so on.
+    /// `count` is given a delay in ticks, and counts to fill in: of ticks with that delay, of those one tick
+    /// later, and so on.
     ///
-    /// They are counted 2 σ and half a tick to both sides of the fullest places, equally far to both: a jitter smaller
-    /// than the known one then draws to neither. Strong light may light places farther away. As long as the last places
-    /// have a quarter of the ticks of the fullest one, more are counted.
+    /// Ticks are counted 2 σ and half a tick to both sides of the fullest places. Both sides are equally
+    /// long, so that a jitter smaller than the known one draws to neither. Strong light may light places
+    /// farther away. As long as the last places have a quarter of the ticks of the fullest one, more are
+    /// counted.
     pub fn count(&mut self, width: u32, sigma: f64, count: impl Fn(i64, &mut [u32])) {
         let Self { counts, about, .. } = self;
         let reach = (2.0 * sigma + 0.5).ceil() as usize;
@@ -197,9 +197,9 @@ pub(super) fn neighbours(marks: &[i64], reach: i64) -> Vec<(i64, f64)> {
 /// The mean of the ticks about the time at which most of them are within ±σ, or in two places side by side; each counts
 /// at its middle.
 ///
-/// If jitter is small, they are on both sides of the end of one tick, with a share s behind it: then the light is late
-/// by that end and σ·Φ⁻¹(s) more. If they are on one side alone, their distance from the end is unknown, and the middle
-/// of the tick is a fair place.
+/// If jitter is small, they are on both sides of the end of one tick, with a share s behind it. Then the
+/// light is late by that end and σ·Φ⁻¹(s) more. If they are on one side alone, their distance from the end is
+/// unknown, and the middle of the tick is a fair place.
 fn fullest(counts: &[u32], first: i64, known: &Known) -> f64 {
     let together = (2 + 2 * known.sigma.round() as usize).min(counts.len().max(1));
     let sum = |window: &[u32]| window.iter().map(|count| u64::from(*count)).sum::<u64>();
@@ -416,7 +416,7 @@ mod tests {
             let late = late_by(&[0, 0, 97, 0, 0], -1, &Known { sigma, ..known });
             assert!((late - 1.5).abs() < 0.01, "{sigma}: {late}");
         }
-        // As many before the end of a tick as behind it: on its end.
+        // Equal numbers before the end of a tick and behind it: on its end.
         assert!((late_by(&[0, 50, 50, 0], 0, &known) - 2.0).abs() < 1e-3);
         assert!(late_by(&[0; 4], 3, &known).is_finite());
     }

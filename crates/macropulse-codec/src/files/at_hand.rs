@@ -30,9 +30,9 @@ pub(super) enum AtHand<R> {
 }
 
 impl<R: Read> AtHand<R> {
-    /// The record of the shots with the ids `owned`: that of the absolute ticks of `span`, which lie behind
-    /// those asked for before, times of ticks being counted from `epoch` on; or the histograms, taps or beats of these
-    /// shots.
+    /// Returns the record of the shots with the ids `owned`: their histograms, taps or beats, or the ticks or
+    /// samples of the absolute ticks of `span`. A span never begins before the one asked for last. Times of
+    /// ticks are counted from `epoch` on.
     pub fn of(
         &mut self,
         owned: &Range<u64>,

@@ -8,11 +8,11 @@ use super::{Digest, Error, UNKNOWN, VERSION, What};
 /// Bytes of every binary header.
 pub(super) const HEADER: usize = 128;
 
-/// What the text of a header says: keys and their values.
+/// The keys in the text of a header, and their values.
 pub(super) struct Keys(Vec<(String, String)>);
 
 impl Keys {
-    /// Reads `# macropulse NAME 1, key=value, …`, all keys of which must be `known`.
+    /// Reads `# macropulse NAME 1, key=value, …`; all keys must be `known`.
     pub fn read<R: Read>(source: &mut Source<R>, known: &[&str]) -> Result<Self, Error> {
         let line = source.line()?.unwrap_or_default().to_owned();
         let name = source.name();
@@ -73,7 +73,7 @@ impl Keys {
         }
     }
 
-    /// So many numbers with blanks between them, all finite, if they are there.
+    /// Returns the `N` numbers with blanks between them, all finite, if they are there.
     pub fn reals<R: Read, const N: usize>(
         &self,
         source: &Source<R>,
@@ -157,7 +157,7 @@ impl Columns {
         Ok(Self { places: known.iter().map(|name| place(name)).collect(), wide: names.len() })
     }
 
-    /// Whether the known column number `column` is there.
+    /// True if the known column number `column` is there.
     pub fn has(&self, column: usize) -> bool {
         self.places[column].is_some()
     }
@@ -182,7 +182,7 @@ impl Columns {
     }
 }
 
-/// Reads a binary header of which kind and version are checked.
+/// Reads a binary header, and checks its kind and version.
 pub(super) fn binary<R: Read>(source: &mut Source<R>) -> Result<[u8; HEADER], Error> {
     let mut header = [0; HEADER];
     if !source.record(&mut header)? {

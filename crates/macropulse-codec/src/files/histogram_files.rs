@@ -21,7 +21,7 @@ const MOST_BINS: u32 = 1 << 16;
 /// Bytes of a count.
 const COUNT: usize = size_of::<u32>();
 
-/// What is said of histograms before they come.
+/// The header of a file of histograms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HistogramHeader {
     /// Width of a bin, fs.
@@ -59,8 +59,8 @@ impl<R: Read> HistogramReader<R> {
     /// are not looked at.
     ///
     /// # Errors
-    /// If it cannot be read, is of no version that is known, has bins that no file has, or is of another
-    /// sensor: bins of another width, at another time or of another number.
+    /// If it cannot be read, is of no version that is known, or has bins that no file has. Also if it is of
+    /// another sensor: bins of another width, at another time or of another number.
     pub fn new(reader: R, wanted: &HistogramHeader) -> Result<Self, Error> {
         let mut source = Source::new(reader, What::Histograms)?;
         if source.form == Form::Text {
@@ -75,7 +75,7 @@ impl<R: Read> HistogramReader<R> {
         Ok(Self { records, header })
     }
 
-    /// What is said before the histograms.
+    /// Returns the header of the file.
     pub fn header(&self) -> &HistogramHeader {
         &self.header
     }
@@ -151,7 +151,7 @@ pub struct HistogramWriter<W> {
 }
 
 impl<W: Write> HistogramWriter<W> {
-    /// Writes the header; as many histograms are to come as it says, if it does.
+    /// Writes the header. If it has a count, this number of histograms must follow.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -166,7 +166,7 @@ impl<W: Write> HistogramWriter<W> {
         Self { out, bytes: Vec::new() }
     }
 
-    /// Writes `histograms`, the first of which is that of the shot with the absolute id `first`.
+    /// Writes `histograms`. The first one belongs to the shot with the absolute id `first`.
     ///
     /// # Errors
     /// If they cannot be written.

@@ -1,13 +1,14 @@
 //! Shot logs, ticks, samples, histograms, taps and beats as files and streams: the seam at which recorded hardware takes the
 //! place of a simulation.
 //!
-//! Shots and ticks have two forms that hold the same: **text**, lines of comma-separated whole numbers under a
-//! line that says what they are, and **binary**, little-endian records under a header. A reader
-//! tells them apart by their first byte. Samples, histograms, taps and beats are binary. `docs/formats.md` has them byte by byte.
+//! Shots and ticks have two forms that hold the same. **Text** has lines of comma-separated whole numbers
+//! under a line that says what they are. **Binary** has little-endian records under a header. A reader tells
+//! them apart by their first byte. Samples, histograms, taps and beats are binary. `docs/formats.md` has them
+//! byte by byte.
 //!
-//! Readers and writers go over any [`Read`](std::io::Read) and [`Write`](std::io::Write), record by
-//! record, and keep none. [`Stream`] reads shots and their record at once and cuts them into bands to be decoded.
-//! What is wrong is told with the line or the byte where it stands.
+//! Readers and writers go over any [`Read`](std::io::Read) and [`Write`](std::io::Write), record by record,
+//! and keep none. [`Stream`] reads shots and their record at once and cuts them into bands to be decoded. An
+//! error names the line or the byte that is wrong.
 
 mod at_hand;
 mod beat_files;
@@ -35,7 +36,7 @@ pub use tick_files::{TickHeader, TickReader, TickWriter};
 /// The version of all these files that is written, and the only one that is read.
 pub const VERSION: u32 = 1;
 
-/// No shot and no tick is later, or earlier, than so many fs from the beginning of the first scan.
+/// The longest time, fs, from the beginning of the first scan to a shot or a tick, before it or after it.
 pub const LONGEST_FS: i64 = 9_000_000_000_000_000_000;
 
 /// Stands in a binary header for a number that is not known.
@@ -50,8 +51,8 @@ pub enum Form {
     Text,
 }
 
-/// What a shot log, ticks and samples are of: a hash of all that is sent and how it is timed. Logs of sensors
-/// that differ in it are not decoded by each other's.
+/// A digest of the sensor of a shot log, ticks or samples: a hash of all that is sent and how it is timed.
+/// Logs of sensors that differ in it are not decoded by each other's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Digest(pub [u8; 16]);
 
@@ -70,7 +71,7 @@ impl fmt::Display for Digest {
     }
 }
 
-/// Where something stands in a file.
+/// A place in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// A line, from 1.
@@ -123,7 +124,7 @@ pub enum Error {
         what: What,
         /// Where.
         place: Place,
-        /// What is wrong, and what to do.
+        /// The fault, and the remedy.
         message: String,
     },
 }

@@ -1,8 +1,8 @@
 //! Samples: the codes of the converters, block by block.
 //!
-//! A block is a run of samples of one channel without a gap. Blocks stand in the order in which they
-//! begin, those that begin at once in the order of their channels, so that a file is read in the memory
-//! of what is decoded together.
+//! A block is a run of samples of one channel without a gap. Blocks stand in the order in which they begin,
+//! those that begin at once in the order of their channels. So a file is read in the memory of what is
+//! decoded together.
 
 use std::io::{self, Read, Write};
 
@@ -19,14 +19,14 @@ const RECORD: usize = 16;
 /// Codes of a block at most: 2 MiB.
 const MOST_CODES: usize = 1 << 20;
 
-/// Codes that are read at once. What a block says of its length is believed so far and no further.
+/// Codes that are read at once. The length that a block claims is believed so far and no further.
 const AT_ONCE: usize = 1 << 14;
 
 /// How far the step of a file may be from that of the sensor, as a share: it may have been computed in
 /// another way, or in four bytes.
 const SAME_STEP: f64 = 1e-6;
 
-/// What is said of samples before they come.
+/// The header of a file of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleHeader {
     /// From sample to sample, fs: a tick.
@@ -35,9 +35,9 @@ pub struct SampleHeader {
     pub channels: u32,
     /// The lowest code and the highest one, at which the converter clips.
     pub codes: (i16, i16),
-    /// What a step of a code is, in the height of a mark of so many detected photons; if it is known.
+    /// Step of a code, as the number of detected photons of a mark of this height; if it is known.
     pub step_photons: Option<f64>,
-    /// What sensor they are of, if it is known.
+    /// The sensor that they are of, if it is known.
     pub digest: Option<Digest>,
     /// Blocks in the file, if it is known.
     pub count: Option<u64>,
@@ -67,9 +67,9 @@ pub struct SampleReader<R> {
     source: Source<R>,
     header: SampleHeader,
     read: u64,
-    /// Where the last block began, and its channel.
+    /// Tick at which the last block began, and its channel.
     last: Option<(i64, u16)>,
-    /// Where the last block of each channel ended.
+    /// Tick at which the last block of each channel ended.
     ends: Vec<Option<i64>>,
 }
 
@@ -78,8 +78,8 @@ impl<R: Read> SampleReader<R> {
     /// not looked at.
     ///
     /// # Errors
-    /// If it cannot be read, is of no version that is known, or of another sensor: samples of another
-    /// rate, of another number of channels, of other codes or of another step.
+    /// If it cannot be read, is of no version that is known, or is of another sensor. Samples of another
+    /// sensor have another rate, another number of channels, other codes or another step.
     pub fn new(reader: R, wanted: &SampleHeader) -> Result<Self, Error> {
         let mut source = Source::new(reader, What::Samples)?;
         if source.form == Form::Text {
@@ -94,7 +94,7 @@ impl<R: Read> SampleReader<R> {
         Ok(Self { source, header, read: 0, last: None, ends })
     }
 
-    /// What is said before the samples.
+    /// Returns the header of the file.
     pub fn header(&self) -> &SampleHeader {
         &self.header
     }
@@ -102,8 +102,8 @@ impl<R: Read> SampleReader<R> {
     /// The next block; `None` behind the last one.
     ///
     /// # Errors
-    /// If it cannot be read, does not come after those before it, has a channel that the sensor has not or
-    /// a code that its converter does not make, or if the file ends too early.
+    /// If it cannot be read, does not come after those before it, or if the file ends too early. Also if it
+    /// has a channel that the sensor has not, or a code that its converter does not make.
     pub fn next_block(&mut self) -> Result<Option<SampleBlock>, Error> {
         let mut record = [0; RECORD];
         if !self.source.record(&mut record)? {
@@ -153,7 +153,7 @@ impl<R: Read> SampleReader<R> {
         Ok(Some(block))
     }
 
-    /// Whether a block of so many codes can stand here.
+    /// Checks that a block of `count` codes can stand here.
     fn check(&self, (first, count): (i64, u32), (channel, rest): (u16, u16)) -> Result<(), Error> {
         if count == 0 || count as usize > MOST_CODES || rest != 0 {
             return self.refuse(format!(
@@ -241,7 +241,7 @@ pub struct SampleWriter<W> {
 }
 
 impl<W: Write> SampleWriter<W> {
-    /// Writes the header; as many blocks are to come as it says, if it does.
+    /// Writes the header. If it has a count, this number of blocks must follow.
     ///
     /// # Errors
     /// If it cannot be written.

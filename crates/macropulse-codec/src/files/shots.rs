@@ -21,16 +21,16 @@ const KEYS: [&str; 7] =
 const COLUMNS: [&str; 8] =
     ["shot", "fired_fs", "fired_ps", "row", "column", "label", "word", "channel"];
 
-/// What is said of a shot log before its shots.
+/// The header of a shot log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShotHeader {
     /// Absolute id of the first shot in the file, counted from the first shot of the first scan.
     pub first: u64,
     /// Ids of the shots whose returns are wanted; the others are guard shots. All, if it is not said.
     pub owned: Option<Range<u64>>,
-    /// What sensor they are of, if it is known.
+    /// The sensor that they are of, if it is known.
     pub digest: Option<Digest>,
-    /// Where the sensor was when the scan began, m.
+    /// Position of the sensor when the scan began, m.
     pub position: [f64; 3],
     /// The turn that carries directions of the sensor into the world, a unit quaternion w, x, y, z.
     pub turn: [f64; 4],
@@ -130,7 +130,7 @@ impl<R: Read> ShotReader<R> {
         Ok(Self { source, header, limits, columns, read: 0, last_fs: i64::MIN })
     }
 
-    /// What is said before the shots.
+    /// Returns the header of the file.
     pub fn header(&self) -> &ShotHeader {
         &self.header
     }
@@ -277,7 +277,7 @@ pub struct ShotWriter<W> {
 }
 
 impl<W: Write> ShotWriter<W> {
-    /// Writes the header; the file is to hold as many shots as it says, if it does.
+    /// Writes the header. If it has a count, the file must hold this number of shots.
     ///
     /// # Errors
     /// If it cannot be written.

@@ -13,13 +13,13 @@ const MARK: [u8; 3] = [0xef, 0xbb, 0xbf];
 /// Bytes asked for at once.
 const BLOCK: usize = 1 << 16;
 
-/// A file under way, of which only a block is kept.
+/// A file under way; only a block of it is kept.
 #[derive(Debug)]
 pub(super) struct Source<R> {
     bytes: BufReader<R>,
     pub form: Form,
     pub what: What,
-    /// Where the record stands that was read last.
+    /// Place of the record that was read last.
     place: Place,
     /// Bytes read so far; in text, lines.
     passed: u64,
@@ -55,7 +55,7 @@ impl<R: Read> Source<R> {
         }
     }
 
-    /// What its header calls it.
+    /// Returns the kind of its records, as its header names it.
     pub fn name(&self) -> &'static str {
         match self.what {
             What::Shots => "shots",
@@ -72,7 +72,7 @@ impl<R: Read> Source<R> {
         Err(Error::Content { what: self.what, place: self.place, message: message.into() })
     }
 
-    /// An error about what stands so many bytes `behind` the beginning of what was read last.
+    /// Returns an error about the place `behind` bytes behind the beginning of what was read last.
     pub fn refuse_behind<T>(&self, behind: u64, message: String) -> Result<T, Error> {
         let place = match self.place {
             Place::Byte(byte) => Place::Byte(byte + behind),

@@ -70,13 +70,13 @@ impl<S: Read, R: Read> Stream<S, R> {
         }
     }
 
-    /// The next band, whose owned shots end before the shot that `until` says of their first one; its
-    /// shots, and its record. `None` behind the last one. What a file of samples does not reach
+    /// Returns the shots and the record of the next band; `None` behind the last one. Its owned shots end
+    /// before the shot that `until` gives for the first of them. Time that a file of samples does not reach
     /// at its beginning or end is left out.
     ///
     /// # Errors
-    /// If a file cannot be read, if its shots are fired so far apart, or have so many ticks or samples,
-    /// that they cannot be decoded together, or if samples are missing between others.
+    /// If a file cannot be read, or if samples are missing between others. Also if shots are fired too far
+    /// apart, or have too many ticks or samples, to be decoded together.
     pub fn next_band(
         &mut self,
         until: impl Fn(u64) -> u64,

@@ -17,16 +17,16 @@ const KEYS: [&str; 3] = ["tick_fs", "count", "digest"];
 
 const COLUMNS: [&str; 3] = ["tick", "channel", "amplitude"];
 
-/// What is said of ticks before they come.
+/// The header of a file of ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TickHeader {
     /// Length of a tick, fs.
     pub tick_fs: i64,
-    /// Whether each has a detector channel.
+    /// True if each has a detector channel.
     pub several: bool,
-    /// Whether the energy of each pulse is measured.
+    /// True if the energy of each pulse is measured.
     pub measured: bool,
-    /// What sensor they are of, if it is known.
+    /// The sensor that they are of, if it is known.
     pub digest: Option<Digest>,
     /// Ticks in the file, if it is known.
     pub count: Option<u64>,
@@ -44,7 +44,7 @@ pub struct TickReader<R> {
 }
 
 impl<R: Read> TickReader<R> {
-    /// Reads the header of the ticks of a sensor with so many `channels`, whose ticks last `tick_fs`.
+    /// Reads the header of the ticks of a sensor with this number of `channels`, whose ticks last `tick_fs`.
     ///
     /// # Errors
     /// If it cannot be read, is of no version that is known, or of another sensor: ticks of another
@@ -72,7 +72,7 @@ impl<R: Read> TickReader<R> {
         Ok(Self { source, header, columns, channels, read: 0, last: None })
     }
 
-    /// What is said before the ticks.
+    /// Returns the header of the file.
     pub fn header(&self) -> &TickHeader {
         &self.header
     }
@@ -228,7 +228,7 @@ pub struct TickWriter<W> {
 }
 
 impl<W: Write> TickWriter<W> {
-    /// Writes the header; as many ticks are to come as it says, if it does.
+    /// Writes the header. If it has a count, this number of ticks must follow.
     ///
     /// # Errors
     /// If it cannot be written.

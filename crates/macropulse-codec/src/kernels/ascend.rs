@@ -1,4 +1,4 @@
-//! Whether numbers ascend.
+//! A test that numbers ascend.
 
 use super::level::Level;
 use crate::on_every_level;
@@ -6,7 +6,7 @@ use crate::on_every_level;
 /// Numbers after which it is asked whether any was out of order.
 const TOGETHER: usize = 1 << 12;
 
-/// Whether each of `numbers` is greater than the one before it.
+/// True if each of `numbers` is greater than the one before it.
 pub(crate) fn ascends(numbers: &[u32]) -> bool {
     match Level::here() {
         // SAFETY: the processor has what this level asks for.

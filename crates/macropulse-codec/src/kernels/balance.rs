@@ -1,4 +1,4 @@
-//! What falls on the marks of a macropulse less what falls on its dark chips.
+//! Light on the marks of a macropulse less light on its dark chips.
 
 use std::ops::Range;
 
@@ -39,7 +39,7 @@ impl Chips {
     }
 }
 
-/// What is lit at one place.
+/// Lit marks and lit dark chips of a macropulse at one place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Balance {
     /// The place, a bit.
@@ -58,9 +58,8 @@ impl Balance {
 }
 
 on_every_level! {
-    /// Of the `places` at which a macropulse of these `chips` may begin in `words`, the one with
-    /// the highest score, the earliest of several; `None` where none has `least`. What reaches
-    /// beyond the end is dark.
+    /// Returns the one of the `places` with the highest score, at which a macropulse of these `chips` may
+    /// begin in `words`; the earliest of several. `None` if none has `least`. Bits beyond the end are dark.
     pub(crate) fn best_balance(
         words: &[u64],
         places: Range<usize>,

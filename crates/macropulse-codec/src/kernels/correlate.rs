@@ -1,9 +1,9 @@
 //! How many marks fit, for many lags at once.
 //!
-//! Every mark gives one bit for each lag. The bits are added the way hardware would: 64 lags
-//! side by side in a machine word, the count of each spread over bit planes, carries saved for
-//! the next plane. Lags are counted in blocks of four or eight machine words: a shot that is about
-//! where it is expected is seen in the shorter one, and all of a gate is passed in the longer one.
+//! Every mark gives one bit for each lag. The bits are added the way hardware would: 64 lags side by side in
+//! a machine word, the count of each spread over bit planes, carries saved for the next plane. Lags are
+//! counted in blocks of four or eight machine words. A shot about where it is expected is seen in the shorter
+//! one, and all of a gate is passed in the longer one.
 
 use super::coarse::COARSE;
 use super::fold::fold;
@@ -64,7 +64,7 @@ impl<const W: usize> Counts<W> {
         self.places = places;
     }
 
-    /// Makes the counts those of so many marks.
+    /// Prepares the counts for this number of `marks`.
     fn expect(&mut self, marks: usize) {
         self.counted = marks;
         self.used = planes_for(marks);
@@ -82,8 +82,9 @@ impl<const W: usize> Counts<W> {
         if let Some(count) = registers::counter::<W>(self.used)
             && words.len() < 1 << 26
         {
-            // SAFETY: the processor has what this level asks for, every mark lies so that its block ends within
-            // the words, a place fits into 32 bits, and there is a plane for each bit of the highest count.
+            // SAFETY: the processor has what this level asks for. Every mark lies so that its block ends
+            // within the words, a place fits into 32 bits, and there is a plane for each bit of the highest
+            // count.
             return unsafe { count(words, first, places, planes) };
         }
         count_within::<W>(words, first, places, &mut planes[..W * self.used]);
@@ -123,8 +124,8 @@ impl<const W: usize> Counts<W> {
     }
 }
 
-/// Tells for each lag whether `least` of the marks at the `places` are lit, none of them behind the `farthest`, from bit
-/// `first` on: one bit of `enough` for each, which is some blocks of W machine words.
+/// Finds the lags at which `least` of the marks at the `places` are lit, from bit `first` on. `enough` is
+/// some blocks of W machine words, and has one bit for each lag. No mark is behind the `farthest`.
 pub(crate) fn with_enough<const W: usize>(
     words: &[u64],
     first: u32,
@@ -152,8 +153,9 @@ pub(crate) fn with_enough<const W: usize>(
     }
 }
 
-/// The `words` from that of bit `first` on, and which bit that is of them; as many at least as are looked at where
-/// blocks end so many bits farther, some of them dark and in `longer` memory.
+/// Returns the `words` from that of bit `first` on, and the place of this bit in them. They hold all words
+/// that are read if blocks end `farther` bits later. If `words` end before that, they are copied to `longer`
+/// memory, and dark ones follow.
 pub(super) fn reached<'a>(
     words: &'a [u64],
     first: u32,
@@ -172,20 +174,21 @@ pub(super) fn reached<'a>(
     (longer, first)
 }
 
-/// Planes for the counts of so many marks.
+/// Returns the number of planes that counts of `marks` marks need.
 pub(super) fn planes_for(marks: usize) -> usize {
     ((usize::BITS - marks.leading_zeros()) as usize).clamp(LOW, PLANES)
 }
 
-/// Whether no bit is lit.
+/// True if no bit is lit.
 #[inline(always)]
 pub(crate) fn is_dark<const W: usize>(lanes: &[u64; W]) -> bool {
     lanes.iter().fold(0, |any, lane| any | lane) == 0
 }
 
 on_every_level! {
-    /// The bits of a block of [`WIDE`] that are lit in any of the blocks of a picture that hold the eight
-    /// ticks so many `behind` bit `first` of it. Blocks that do not end within the words are dark.
+    /// Returns the bits that are lit in any of some blocks of [`WIDE`] words of a picture. These blocks hold
+    /// the eight ticks that are `behind` ticks later than bit `first` of it, for each of `behind`. Blocks
+    /// that do not end within the words are dark.
     pub(crate) fn any_behind(words: &[u64], first: usize, behind: &[u32]) -> [u64; WIDE] {
         let mut any = [0; WIDE];
         for &behind in behind {
@@ -374,7 +377,7 @@ mod tests {
         let expected: Vec<u32> = (0..64 * W as u32).map(found).collect();
         let counted = at_each_level(|| {
             let mut counts = Counts::<W>::default();
-            // What was counted before is forgotten.
+            // Earlier counts are forgotten.
             counts.count(&words, 0, &WordTicks::new(&[0, 7, 9, 800], 1), &[0, 1, 2, 500, 900]);
             counts.count(&words, first, word, bits);
             counts
@@ -402,7 +405,7 @@ mod tests {
         let expected: Vec<u32> = (0..64 * W as u32).map(found).collect();
         let counted = at_each_level(|| {
             let mut counts = Counts::<W>::default();
-            // What was counted before is forgotten.
+            // Earlier counts are forgotten.
             counts.count_each(&words, 0, &[7; 20], 6500);
             counts.count_each(&words, first, places, 6500);
             counts

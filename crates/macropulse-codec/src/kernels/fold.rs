@@ -1,9 +1,9 @@
 //! Marks counted where a code word is sent in several bits: the bits are summed first.
 //!
-//! Of a macropulse with B lit bits and W marks in a code word, B·W marks are counted for each lag. Where mark m is
-//! looked for at lag l, the B bits are looked at m + l ticks behind their beginnings, and so they are for every other
-//! mark and lag with the same m + l. So they are summed once for each m + l, in bit planes, and W of these sums are
-//! added up for a lag.
+//! A macropulse with B lit bits and W marks in a code word has B·W marks to count for each lag. For mark m at
+//! lag l, the B bits are looked at m + l ticks behind their beginnings. The same places serve every other
+//! mark and lag with the same m + l. So they are summed once for each m + l, in bit planes, and W of these
+//! sums are added up for a lag.
 
 use super::correlate::{WIDE, planes_for, reached};
 use super::level::Level;
@@ -14,9 +14,10 @@ const SUMS: usize = 4;
 /// Planes of each of the counts that are added up: for fewer than 64 marks of a word.
 const OF_WORD: usize = 6;
 
-/// Counts the marks of the `word` in each of the `bits`, both ascending, from bit `first` of the `words` on, for the
-/// lags of `W` machine words, into as many `planes` as the highest count has; what is beyond the end is dark.
-/// `sums` is memory. Or tells that this would take longer than to count one mark after another.
+/// Counts the marks of the `word` in each of the `bits`, from bit `first` of the `words` on, for the lags of
+/// `W` machine words. Marks and bits ascend, and places beyond the end are dark. There must be one of the
+/// `planes` for each bit of the highest count; `sums` is memory. Returns false, without counts, if this would
+/// take longer than to count one mark after another, or if it cannot be done.
 pub(super) fn fold<const W: usize>(
     words: &[u64],
     first: u32,
@@ -36,15 +37,16 @@ pub(super) fn fold<const W: usize>(
     }
     assert_eq!(planes.len(), W * planes_for(word.len() * bits.len()));
     sums.resize(SUMS * length, 0);
-    // SAFETY: the processor has what this level asks for; the words reach a plane of sums and a register beyond
-    // each bit, and a plane of sums a block and one word beyond each mark; bits and marks are as few as
-    // `is_shorter` asks for, and there is a plane for each bit of the highest count.
+    // SAFETY: the processor has what this level asks for. The words reach a plane of sums and a register
+    // beyond each bit, and a plane of sums a block and one word beyond each mark. Bits and marks are as few
+    // as `is_shorter` asks for, and there is a plane for each bit of the highest count.
     unsafe { fold(words, first, (word, bits), sums, planes) };
     true
 }
 
-/// Whether fewer blocks of lags are added up than there are marks: to sum the bits, as long as the word and the lags,
-/// and each plane of the sums for each mark of the word. Of `kim-park-2016` that is so of three bits and more.
+/// True if fewer blocks of lags are added up than there are marks. The sums need the blocks of the word and
+/// of the lags for each bit. Adding them up needs one block for each plane of the sums and each mark of the
+/// word. For `kim-park-2016` it is true with three bits and more.
 fn is_shorter<const W: usize>(word: &[u32], bits: &[u32]) -> bool {
     let longest = word.last().map_or(0, |last| *last as usize / (64 * W));
     let planes = (usize::BITS - bits.len().leading_zeros()) as usize;
@@ -55,8 +57,8 @@ fn is_shorter<const W: usize>(word: &[u32], bits: &[u32]) -> bool {
 /// Does what [`fold`] does, if it can.
 type Folder = unsafe fn(&[u64], u32, (&[u32], &[u32]), &mut [u64], &mut [u64]);
 
-/// What does it in blocks of `W` machine words on this level; `None` where that has no registers as long as the
-/// shorter block.
+/// Returns the function that does it in blocks of `W` machine words on this level; `None` if that has no
+/// registers as long as the shorter block.
 fn folder<const W: usize>() -> Option<Folder> {
     match (Level::here(), W) {
         #[cfg(target_arch = "x86_64")]
@@ -69,7 +71,8 @@ fn folder<const W: usize>() -> Option<Folder> {
     }
 }
 
-/// [`Folder`] in registers of so many lanes, with what [`super::registers`] has for them: sums, then adds up.
+/// Defines a [`Folder`] in registers of `$lanes` lanes, with what [`super::registers`] has for them: it sums,
+/// then adds up.
 #[cfg(target_arch = "x86_64")]
 macro_rules! folder {
     (
@@ -98,13 +101,14 @@ macro_rules! folder {
             }
         }
 
-        /// Sums, for each place of a code word and of a block of lags, what is lit so many `bits` behind it, into
-        /// [`SUMS`] planes.
+        /// Sums, for each place of a code word and of a block of lags, the light at each of the `bits` behind
+        /// it, into [`SUMS`] planes.
         ///
         /// # Safety
         ///
-        /// The processor must have the features, a plane must be whole registers, and `words`, fewer than 2^26, must
-        /// reach a plane and a register beyond the one in which each of the bits lies: fewer of them than 2^[`SUMS`].
+        /// The processor must have the features, and a plane must be whole registers. `words`, fewer than
+        /// 2^26, must reach a plane and a register beyond the word in which each of the bits lies. There must
+        /// be fewer bits than 2^[`SUMS`].
         #[target_feature(enable = $features)]
         unsafe fn $sums(words: &[u64], first: u32, bits: &[u32], planes: &mut [u64]) {
             adders!(add, add_two, $sum, $carry, $and, $xor);
@@ -144,13 +148,13 @@ macro_rules! folder {
             }
         }
 
-        /// Adds up the sums, of which `USED` planes are lit, over the marks of a `word`, for the lags of `W` machine
-        /// words, into planes.
+        /// Adds up the `sums` over the marks of a `word`, for the lags of `W` machine words, into planes.
+        /// `USED` planes of the sums are lit.
         ///
         /// # Safety
         ///
-        /// The processor must have the features, and a plane of `sums` must reach a register and one word beyond
-        /// the one in which each mark lies for the last lags: fewer of them than 2^[`OF_WORD`].
+        /// The processor must have the features. A plane of `sums` must reach a register and one word beyond
+        /// the word in which each mark lies for the last lags. There must be fewer marks than 2^[`OF_WORD`].
         #[target_feature(enable = $features)]
         unsafe fn $over_word<const W: usize, const USED: usize>(
             sums: &[u64],

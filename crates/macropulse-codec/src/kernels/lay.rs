@@ -17,8 +17,8 @@ fn before(ticks: &[u32], end: i64) -> usize {
 }
 
 on_every_level! {
-    /// Lights, in `words`, of which the first bit is tick `origin`, those of the sorted `ticks` that
-    /// are before `end`, and tells how many these are. None may be before the origin.
+    /// Lights those of the sorted `ticks` that are before `end`, in `words`, and tells how many these are.
+    /// The first bit of `words` is tick `origin`. No tick may be before it.
     pub(crate) fn lay(words: &mut [u64], origin: i64, ticks: &[u32], end: i64) -> usize {
         let count = before(ticks, end.min(origin + 64 * words.len() as i64));
         let ticks = &ticks[..count];
@@ -75,7 +75,7 @@ on_every_level! {
 }
 
 on_every_level! {
-    /// Makes each of `sums` that of so many of the `numbers` `together`, from the same place on.
+    /// Makes each of `sums` the sum of `together` of the `numbers`, from the same place on.
     pub(crate) fn sum_along(numbers: &[u32], together: usize, sums: &mut [u32]) {
         sums.fill(0);
         for away in 0..together {

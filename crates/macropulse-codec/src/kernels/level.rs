@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 /// A set of instructions that kernels are compiled for, each including those before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// What every processor of the target has.
+    /// The instructions that every processor of the target has.
     Plain,
     /// x86-64 with AVX2 and BMI (2013).
     Avx2,
@@ -20,7 +20,7 @@ pub enum Level {
 /// The environment variable that bounds the level.
 pub const VARIABLE: &str = "MACROPULSE_KERNELS";
 
-/// What [`VARIABLE`] asks for; `None` where it is not set.
+/// Returns the level that [`VARIABLE`] asks for; `None` if it is not set.
 ///
 /// # Errors
 /// If it names no level, or one that this processor does not have: one sentence with the remedy.
@@ -90,7 +90,7 @@ impl Level {
 
 /// Compiles a function once for each [`Level`], and calls the widest version there is.
 ///
-/// What the function calls takes part only if it is inlined: mark it `#[inline(always)]`.
+/// Functions that it calls take part only if they are inlined: mark them `#[inline(always)]`.
 #[macro_export]
 macro_rules! on_every_level {
     (
@@ -143,7 +143,7 @@ pub mod forced {
         LEVEL.get()
     }
 
-    /// What `run` gives on this thread at each level that the processor has, the plain one first.
+    /// Returns the results of `run` on this thread at each level that the processor has, the plain one first.
     pub fn at_each_level<T>(mut run: impl FnMut() -> T) -> Vec<(Level, T)> {
         let highest = Level::here();
         let mut results = Vec::new();

@@ -47,12 +47,12 @@ on_every_level! {
     }
 }
 
-/// Whether the first ticks are the marks of `word`, begun so many ticks behind `start` as each of `bits`
-/// tells, with no tick between them. `false` where there are too few ticks.
+/// True if the first ticks are the marks of `word`, begun at each of the `bits` behind `start`, with no tick
+/// between them. `false` if there are too few ticks.
 pub(crate) fn begin_with(ticks: &[u32], word: &WordTicks, bits: &[u32], start: u32) -> bool {
     let marks = &word.ticks[..word.marks];
     let Some(ticks) = ticks.get(..bits.len() * marks.len()) else { return false };
-    // Where another macropulse lies over it this tells.
+    // If another macropulse overlaps, the last tick shows it.
     let (Some(tick), Some(bit), Some(mark)) = (ticks.last(), bits.last(), marks.last()) else {
         return true;
     };
@@ -60,7 +60,7 @@ pub(crate) fn begin_with(ticks: &[u32], word: &WordTicks, bits: &[u32], start: u
         return false;
     }
     match Level::here() {
-        // SAFETY: the processor has what this level asks for, and there are as many ticks as marks.
+        // SAFETY: the processor has what this level asks for, and there is a tick for each mark of each bit.
         #[cfg(target_arch = "x86_64")]
         Level::Avx512 => unsafe { avx512::are_marks(ticks, marks, bits, start) },
         // SAFETY: as above.
@@ -71,7 +71,7 @@ pub(crate) fn begin_with(ticks: &[u32], word: &WordTicks, bits: &[u32], start: u
 }
 
 on_every_level! {
-    /// The same of as many ticks as there are marks.
+    /// The same, with one tick for each mark of each bit.
     fn are_marks(ticks: &[u32], marks: &[u32], bits: &[u32], start: u32) -> bool {
         bits.iter().zip(ticks.chunks_exact(marks.len().max(1))).all(|(bit, ticks)| {
             let begin = start.wrapping_add(*bit);
@@ -92,7 +92,7 @@ mod avx2 {
 
     /// # Safety
     ///
-    /// The processor must have AVX2, and there must be as many `ticks` as marks in all bits.
+    /// The processor must have AVX2, and there must be one of `ticks` for each mark in all bits.
     #[target_feature(enable = "avx2")]
     pub(super) unsafe fn are_marks(ticks: &[u32], marks: &[u32], bits: &[u32], start: u32) -> bool {
         let Some(last) = marks.len().checked_sub(HALF) else {
@@ -105,7 +105,7 @@ mod avx2 {
             // The last marks are compared together with some of those before them.
             while first < marks.len() {
                 let from = first.min(last);
-                // SAFETY: so many ticks are there for each bit, and no mark behind the last one is read.
+                // SAFETY: there is a tick for each mark of each bit, and no mark behind the last one is read.
                 let (mark, tick) = unsafe {
                     let tick = ticks.as_ptr().add(index * marks.len() + from);
                     (
@@ -131,14 +131,14 @@ mod avx512 {
     /// Blocks that are compared in each pass over the bits: words have two, rarely more.
     const BLOCKS: usize = 2;
 
-    /// So many ticks ahead are fetched, three macropulses of `kim-park-2016`: the last one of each is asked for
-    /// before all others, which no prefetcher foresees. With 384 and with 768 a clean band takes as long, with
-    /// 200 or none a sixteenth more.
+    /// Distance, in ticks, at which ticks are fetched ahead: three macropulses of `kim-park-2016`. The last
+    /// one of each is asked for before all others, which no prefetcher foresees. With 384 and with 768 a
+    /// clean band takes equally long, with 200 or none a sixteenth more.
     const AHEAD: usize = 512;
 
     /// # Safety
     ///
-    /// The processor must have AVX-512 F, and there must be as many `ticks` as marks in all bits.
+    /// The processor must have AVX-512 F, and there must be one of `ticks` for each mark in all bits.
     #[target_feature(enable = "avx512f")]
     pub(super) unsafe fn are_marks(ticks: &[u32], marks: &[u32], bits: &[u32], start: u32) -> bool {
         let start = _mm512_set1_epi32(start as i32);
@@ -159,14 +159,14 @@ mod avx512 {
                     ticks.as_ptr().wrapping_add(index * marks.len() + pass * BLOCKS * LANES);
                 for block in 0..BLOCKS {
                     let first = of_bit.wrapping_add(block * LANES);
-                    // SAFETY: so many ticks are there for each bit, and no more is read; what is fetched need not
-                    // be there.
+                    // SAFETY: there is a tick for each mark of each bit, and no more is read; what is fetched
+                    // need not be there.
                     let found = unsafe {
                         _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(AHEAD).cast());
                         _mm512_maskz_loadu_epi32(used[block], first.cast())
                     };
                     let mark = _mm512_add_epi32(begin, expected[block]);
-                    // What is wrong already, or not the same in both.
+                    // Wrong already, or not the same in both.
                     const OR_DIFFERENT: i32 = 0b1111_0110;
                     wrong[block] =
                         _mm512_ternarylogic_epi32::<OR_DIFFERENT>(wrong[block], found, mark);

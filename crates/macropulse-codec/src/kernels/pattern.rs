@@ -23,7 +23,7 @@ impl Pattern {
             words[word] |= 1 << (bit % 64);
         }
         let blocks = (words.len() - 1).div_ceil(LANES);
-        // What is shifted out of the last word goes into one more.
+        // Bits that are shifted out of the last word go into one more.
         words.resize(1 + words.len().div_ceil(LANES) * LANES, 0);
         Self { words, blocks }
     }
@@ -41,8 +41,8 @@ impl Pattern {
 }
 
 on_every_level! {
-    /// How many bits of `pattern`, begun so many bits `after` bit `first`, modulo 2⁶⁴, are lit in `words`,
-    /// for each of these. What reaches beyond the end is dark.
+    /// Counts the bits of `pattern` that are lit in `words` at each of its beginnings, which are `after` bits
+    /// behind bit `first`, modulo 2⁶⁴. Bits beyond the end are dark.
     pub(crate) fn lit_in_each(
         words: &[u64],
         first: usize,
@@ -78,10 +78,10 @@ on_every_level! {
 const SUMMED: usize = 7;
 
 on_every_level! {
-    /// What [`lit_in_all`] counts of `pattern` begun at bit `first`, at the next bit, and so on: one number for each
-    /// of the `counts`, fewer than 64.
+    /// Counts as [`lit_in_all`] does, for `pattern` begun at bit `first`, at the next bit, and so on: one
+    /// number for each of the `counts`, fewer than 64.
     ///
-    /// What is lit is summed up once, as bit planes, and the pattern is moved along the sums.
+    /// Lit bits are summed up once, as bit planes, and the pattern is moved along the sums.
     pub(crate) fn lit_in_row(
         words: &[u64],
         first: usize,
@@ -120,8 +120,8 @@ on_every_level! {
 }
 
 on_every_level! {
-    /// How many bits of `pattern` are lit in `words` wherever it begins, so many bits `after` bit `first`,
-    /// modulo 2⁶⁴: any of these. What reaches beyond the end is dark.
+    /// Counts the bits of `pattern` that are lit in `words` at any of its beginnings, which are `after` bits
+    /// behind bit `first`, modulo 2⁶⁴. Bits beyond the end are dark.
     pub(crate) fn lit_in_any(words: &[u64], first: usize, after: &[u32], pattern: &Pattern) -> u32 {
         let mut sums = [0; LANES];
         for (block, mask) in pattern.own().iter().enumerate() {
@@ -188,15 +188,14 @@ fn parts(bit: usize) -> (usize, usize) {
     (bit / 64, bit % 64)
 }
 
-/// How many bits of `pattern`, begun at bit `first`, are lit in `words`. What reaches beyond the end is
-/// dark.
+/// Counts the bits of `pattern`, begun at bit `first`, that are lit in `words`. Bits beyond the end are dark.
 pub(crate) fn lit_in(words: &[u64], first: usize, pattern: &Pattern) -> u32 {
     lit_in_all(words, first, &[0], pattern)
 }
 
 on_every_level! {
-    /// Whether all bits of `pattern`, begun so many bits `after` bit `first`, are lit in `words`, for all
-    /// of these, modulo 2⁶⁴. What reaches beyond the end is dark.
+    /// True if all bits of `pattern` are lit in `words` at all of its beginnings, which are `after` bits
+    /// behind bit `first`, modulo 2⁶⁴. Bits beyond the end are dark.
     pub(crate) fn are_lit(words: &[u64], first: usize, after: &[u32], pattern: &Pattern) -> bool {
         // A closure would not be compiled for the level.
         for after in after {
@@ -217,8 +216,8 @@ on_every_level! {
 }
 
 on_every_level! {
-    /// Puts the bits of `pattern`, begun so many bits `after` bit `first`, out in `words`, for all of
-    /// these, modulo 2⁶⁴. What reaches beyond the end is left away.
+    /// Puts out the bits of `pattern` in `words` at all of its beginnings, which are `after` bits behind bit
+    /// `first`, modulo 2⁶⁴. Bits beyond the end are left away.
     pub(crate) fn put_out(words: &mut [u64], first: usize, after: &[u32], pattern: &Pattern) {
         for after in after {
             under(words, first.wrapping_add(*after as usize), pattern, |word, mask| *word &= !mask);
@@ -254,7 +253,8 @@ fn under(words: &mut [u64], first: usize, pattern: &Pattern, to_word: impl Fn(&m
 }
 
 on_every_level! {
-    /// Makes `ahead` what `words`, as many, are, with the `reach` bits before each one that is lit.
+    /// Copies `words` to `ahead`, which has their length, and lights the `reach` bits before each lit one,
+    /// too.
     pub(crate) fn look_ahead(words: &[u64], ahead: &mut [u64], reach: usize) {
         let Some((last, before)) = ahead.split_last_mut().filter(|_| reach > 0) else {
             ahead.copy_from_slice(words);

@@ -10,13 +10,14 @@ const MANY: usize = PLANES - LOW;
 /// Counts the marks at `places` from bit `first` of the words on, into planes.
 pub(super) type Counter = unsafe fn(&[u64], u32, &[u32], &mut [u64]);
 
-/// What counts in blocks of `W` machine words on this level, into so many planes; `None` where that has no
-/// registers as long as the shorter block.
+/// Returns the function that counts in blocks of `W` machine words on this level, into this number of
+/// `planes`; `None` if the level has no registers as long as the shorter block.
 ///
 /// # Safety
 ///
-/// To be called, it asks for `words`, fewer than 2^26, that reach a block and one word beyond the one in which
-/// the bit `first + place` lies, for each of the places; for fewer of these than 2^`planes`; and for all planes.
+/// For a call, `words`, fewer than 2^26, must reach a block and one word beyond the word in which the bit
+/// `first + place` lies, for each of the places. There must be fewer places than 2^`planes`, and all planes
+/// must be there.
 pub(super) fn counter<const W: usize>(planes: usize) -> Option<Counter> {
     Some(match (Level::here(), planes > LOW + FEW) {
         (Level::Avx512, false) => avx512::count::<W, FEW>,
@@ -27,10 +28,12 @@ pub(super) fn counter<const W: usize>(planes: usize) -> Option<Counter> {
     })
 }
 
-/// Tells from which bits of the words on there are so many marks at `places`, behind them, from bit `first` on.
+/// Finds the bits of the words, from bit `first` on, behind which a least number of the marks at `places` is
+/// lit.
 pub(super) type Enough = unsafe fn(&[u64], u32, &[u32], u32, &mut [u64]);
 
-/// What tells that on this level, with counts of so many planes; `None` as above.
+/// Returns the function that finds them on this level, with counts of this number of `planes`; `None` as
+/// above.
 ///
 /// # Safety
 ///
@@ -64,22 +67,23 @@ macro_rules! adders {
 }
 pub(super) use adders;
 
-/// Counts in a register of so many lanes: how it is stored, how a block that begins at a bit of the words is
-/// read, and how three bits are summed in each lag, and carried.
+/// Defines counts in a register of `$lanes` lanes. Its arguments are how that is stored, how a block from a
+/// bit of the words on is read, and how three bits are summed in each lag, and carried.
 macro_rules! counter {
     (
         $features:literal, $name:ident, $lanes:ident, $dark:ident, $lit:ident,
         $store:ident, $cut:ident, $sum:ident, $carry:ident, $and:ident, $or:ident, $xor:ident
     ) => {
-        /// Counts the marks for the lags of one register, and puts a plane of the counts into every `W`th word of `out`
-        /// and those behind it. Or it `TELLS` for as many lags as `out` has bits whether there are `least` marks.
+        /// Counts the marks for the lags of one register, and puts a plane of the counts into every `W`th
+        /// word of `out` and those behind it. If it `TELLS`, each bit of `out` is a lag, and becomes lit if
+        /// there are `least` marks.
         ///
         /// # Safety
         ///
-        /// The processor must have the features, and `words`, fewer than 2^26, must reach a register and one
-        /// word beyond the one in which the bit `first + place` lies, for each of `places`, and of those of the last
-        /// register. These must be fewer than 16 · 2^`HIGH`, and `out` must have as many more planes than [`LOW`],
-        /// or whole registers.
+        /// The processor must have the features. `words`, fewer than 2^26, must reach a register and one word
+        /// beyond the word in which the bit `first + place` lies, for each of `places`, in the last register,
+        /// too. There must be fewer places than 16 · 2^`HIGH`. `out` must have `HIGH` planes more than
+        /// [`LOW`], or whole registers.
         #[target_feature(enable = $features)]
         unsafe fn $name<const W: usize, const HIGH: usize, const TELLS: bool>(
             words: &[u64],
@@ -336,8 +340,8 @@ pub(super) mod avx2 {
         unsafe { narrow::<NARROW, HIGH, true>(words, first, places, least, enough) }
     }
 
-    /// Bits to shift by to the right where a block begins so many bits behind the beginning of a byte, and
-    /// to the left in the bytes behind that one; each in the lower half of a register.
+    /// Shifts for a block that begins a number of bits behind the beginning of a byte: to the right, and to
+    /// the left in the bytes behind that one. Each is in the lower half of a register.
     static RIGHT: [u64; 9] = [0, 1, 2, 3, 4, 5, 6, 7, 0];
     static LEFT: [u64; 9] = [8, 7, 6, 5, 4, 3, 2, 1, 0];
 

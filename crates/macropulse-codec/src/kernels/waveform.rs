@@ -13,9 +13,9 @@ const BLOCK: usize = 1024;
 /// Lags that are passed by together where none stands out.
 const PASSED: usize = 64;
 
-/// Filters `codes`, with as much more as the `rest` says unless that is empty, with `taps`, of an odd number:
-/// entry n of `filtered` becomes Σ taps\[k\]·codes\[n + k − r\], r being half of their number, with 0 for
-/// codes beyond the ends and in the `dark` ranges, which ascend and do not overlap.
+/// Filters `codes` with `taps`, of an odd number. The `rest` is added to the codes unless it is empty. Entry
+/// n of `filtered` becomes Σ taps\[k\]·codes\[n + k − r\], r being half of the number of taps. Codes are 0
+/// beyond the ends and in the `dark` ranges, which ascend and do not overlap.
 pub(crate) fn filter(
     (codes, rest): (&[i16], &[f32]),
     taps: &[f32],

@@ -42,7 +42,7 @@ pub fn codebook() -> Codebook {
     Codebook::new(Family::separated(words).unwrap(), None, 1, Keying::OnOff).unwrap()
 }
 
-/// Light that comes back: of which shot, after how many ticks, and how many photons per mark.
+/// Light that comes back: its shot, its delay in ticks, and its photons per mark.
 #[derive(Debug, Clone, Copy)]
 pub struct Echo {
     pub shot: usize,
@@ -76,7 +76,7 @@ impl Poles {
     }
 }
 
-/// What one photon makes, in each step of a mark's light, and how many steps later that is highest.
+/// Returns the response to a mark of one photon, step by step, and the index of its highest step.
 fn pulse() -> (Vec<f64>, usize) {
     let light = |at: usize| (-((at as f64 - 60.0) / LENGTH).powi(2) / 2.0).exp();
     let all: f64 = (0..121).map(light).sum();
@@ -87,9 +87,9 @@ fn pulse() -> (Vec<f64>, usize) {
     (pulse, highest)
 }
 
-/// What the receiver is told, for a noise of so many codes: photons per code.
+/// Codes per photon, for a noise of 2.5 codes.
 fn codes_per_photon() -> f64 {
-    // Of white noise of deviation 1 a step.
+    // For white noise of deviation 1 a step.
     let (raw, filtered) = deviations();
     // LSB = raw/2.5; `filtered` photons make a signal of their own.
     2.5 / raw * filtered / SIGMA
@@ -116,7 +116,7 @@ fn deviations() -> (f64, f64) {
     (raw.sqrt(), behind.sqrt())
 }
 
-/// What the receiver knows of the signal.
+/// The signal as the receiver knows it.
 pub fn sampling() -> Sampling {
     let (pulse, highest) = pulse();
     let scale = codes_per_photon();
@@ -154,7 +154,7 @@ pub fn receiver_of(sampling: Sampling) -> Receiver {
     Receiver { gate_ticks: (8, 2502), method, ..Receiver::matched(TICK_FS) }
 }
 
-/// So many shots one behind the other.
+/// Returns the log of `shots` shots, one behind the other.
 pub fn log(shots: usize) -> ShotLog {
     let fired: Vec<i64> = (0..shots as i64).map(|shot| shot * PERIOD * TICK_FS).collect();
     let words: Vec<u16> = (0..shots).map(|shot| (shot % 10) as u16).collect();

@@ -1,4 +1,4 @@
-//! What a budget says, for programs.
+//! A budget as JSON, for programs.
 
 use macropulse::channel::idealised as idealised_in;
 use macropulse::design::safety::{Class1, Limit, Rule};

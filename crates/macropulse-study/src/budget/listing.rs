@@ -1,4 +1,4 @@
-//! What a budget says, as text for people.
+//! A budget as text, for people.
 
 use macropulse::channel::idealised as idealised_in;
 use macropulse::codec::decode::Method;
@@ -8,8 +8,8 @@ use macropulse::environment::Environment;
 use super::{Farthest, Figures};
 use crate::text::{Columns, section, short};
 
-/// Below such a probability a quick receiver may find fewer shots than there are to be found: of rooms
-/// with 0.95 it loses next to none, with 0.5 one in a hundred, with 0.1 half to nearly all.
+/// Probability of a return below which a quick receiver may find fewer shots than a thorough one. At 0.95 it
+/// loses next to no shots of rooms, at 0.5 one in a hundred, at 0.1 half to nearly all.
 const LIKELY: f64 = 0.9;
 
 impl Figures<'_> {
@@ -49,7 +49,7 @@ impl Figures<'_> {
         columns
     }
 
-    /// What photons are counted of: a mark, or the whole of a shot without pulses.
+    /// Returns the unit for which photons are counted: a mark, or the whole shot if it has no pulses.
     fn part(&self) -> &'static str {
         if self.design.emission.is_pulsed() { "mark" } else { "shot" }
     }

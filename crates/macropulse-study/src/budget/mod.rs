@@ -25,7 +25,7 @@ pub const USUAL_PD: f64 = 0.9;
 /// False points per shot that are accepted where nothing else is said.
 pub const USUAL_FALSE_POINTS: f64 = 1e-4;
 
-/// What is wanted of `design` where nothing else is said, of a target at the rated range of the sensor.
+/// Returns the default requirements on `design`, for a target at the rated range of the sensor.
 pub fn usual(design: &Design) -> Wanted {
     Wanted {
         reflectance: USUAL_REFLECTANCE,
@@ -46,14 +46,14 @@ pub struct Figures<'a> {
     pub chosen: Forecaster<'a>,
     /// The sensor in the same environment at night.
     pub night: Forecaster<'a>,
-    /// What is wanted of it.
+    /// Requirements on the sensor.
     pub wanted: Wanted,
-    /// What must hold, in the order of the light.
+    /// Checks that must hold, in the order of the light.
     pub checks: Vec<Check>,
     /// The light that a receiver which must see every single mark needs, over the light there is;
     /// `None` where shots are not coded.
     pub mark_by_mark: Option<f64>,
-    /// What is to be expected of the target wanted, in the environment chosen.
+    /// Forecast for the target wanted, in the environment chosen.
     pub there: Forecast,
     /// How far each of [`REFLECTANCES`] is seen.
     pub farthest: Vec<Farthest>,
@@ -68,12 +68,12 @@ pub struct Farthest {
     pub range: Option<f64>,
     /// The same at night, m.
     pub range_at_night: Option<f64>,
-    /// What is to be expected of it at the range wanted, in the environment chosen.
+    /// Forecast at the range wanted, in the environment chosen.
     pub there: Forecast,
 }
 
 impl<'a> Figures<'a> {
-    /// What `design` will do of what is `wanted` of it in `environment`.
+    /// Returns the budget of `design` in `environment` for the requirements `wanted`.
     ///
     /// # Errors
     /// If the sensor cannot work in that environment, as [`Forecaster::new`].
@@ -99,7 +99,7 @@ impl<'a> Figures<'a> {
         })
     }
 
-    /// Whether all that must hold holds.
+    /// Returns true if all checks hold.
     pub fn closes(&self) -> bool {
         self.first_failure().is_none()
     }

@@ -36,7 +36,7 @@ impl Figures<'_> {
     }
 }
 
-/// What a chart shows against the range.
+/// A quantity that a chart shows against the range.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Photons,
@@ -58,15 +58,14 @@ impl Kind {
     }
 }
 
-/// What is to be expected of a reflectance along the range, in the environment chosen and at
-/// night.
+/// Forecasts for a reflectance along the range, in the environment chosen and at night.
 struct Curve {
     reflectance: f64,
     chosen: Vec<Forecast>,
     night: Vec<Forecast>,
 }
 
-/// What the charts of a budget share.
+/// Data that the charts of a budget share.
 struct Drawn {
     /// Nearest and farthest range that curves show, m.
     span: [f64; 2],
@@ -97,7 +96,7 @@ impl Drawn {
         Self { span: [nearest, farthest], range: wanted.range, pd: wanted.pd, curves }
     }
 
-    /// What `kind` is along the range, of every reflectance.
+    /// Draws `kind` against the range, for every reflectance.
     fn chart(&self, title: &str, kind: Kind) -> Figure {
         let y = match kind {
             Kind::Pd => Axis::linear(title).limits(0.0, 1.0),

@@ -1,16 +1,16 @@
-//! What a lidar hangs on: one thing changed at a time.
+//! Ablation of a lidar: one thing changed at a time.
 
 use toml::Value;
 
 use super::Error;
 use super::trial::{Bench, Counts, Trial};
 
-/// What is left of a lidar if one thing is otherwise.
+/// Result for a lidar with one thing changed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ablation {
-    /// What is changed.
+    /// Description of the change.
     pub what: String,
-    /// What is found then, in the order of [`super::Scenery::ALL`].
+    /// Counts with the change, in the order of [`super::Scenery::ALL`].
     pub counts: [Counts; 2],
 }
 
@@ -44,7 +44,7 @@ fn half(energy_nj: f64) -> Value {
     toml::Table::from_iter([key]).into()
 }
 
-/// What each change leaves of `best`; `None` if the watch said stop.
+/// Returns the counts of `best` with each change; `None` if the watch said stop.
 pub(super) fn ablations(bench: &Bench, best: &Trial) -> Result<Option<Vec<Ablation>>, Error> {
     let mut all = Vec::new();
     for (what, changes) in changes(best.candidate.marks, best.candidate.energy * 1e9) {

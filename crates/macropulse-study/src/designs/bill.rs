@@ -1,4 +1,4 @@
-//! What a lidar is made of: quantities by which one is compared with another.
+//! The bill of a lidar: quantities by which one is compared with another.
 
 use macropulse::design::Design;
 
@@ -10,7 +10,7 @@ use super::requirements::Requirements;
 /// Highest power of a Gaussian pulse times its full width at half maximum, over its energy: √(4·ln 2/π).
 const PEAK: f64 = 0.939_437_278_699_651_3;
 
-/// What turns the light of a channel into times.
+/// Converter from the light of a channel to times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Converter {
     /// An ADC, and logic that finds words and cancels what it has explained.
@@ -20,7 +20,7 @@ pub enum Converter {
 }
 
 impl Converter {
-    /// What it is called.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::AdcAndCanceller => "ADC and canceller",
@@ -29,12 +29,12 @@ impl Converter {
     }
 }
 
-/// What all channels of a candidate take together.
+/// Quantities of a candidate, over all its channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bill {
     /// Photodiodes, each with an amplifier and a converter of its own.
     pub channels: u32,
-    /// What each channel has behind its amplifier.
+    /// Converter behind the amplifier of each channel.
     pub converter: Converter,
     /// Samples a second of all channels together; 0 where no ADC is needed.
     pub samples_per_s: f64,

@@ -24,11 +24,11 @@ const LATE: f64 = 20.0;
 /// Words of a code: with ten of them no two shots in flight that are nearer than ten have the same one.
 pub(super) const WORDS: u32 = 10;
 
-/// What a lidar does between its shots: as a code lets it, no more than its mirror asks, or until every echo
-/// is back.
+/// Schemes of a lidar. A coded one waits between its shots no longer than its mirror asks; the other one
+/// waits until every echo is back.
 pub(super) const SCHEMES: [&str; 2] = ["coded", "waiting"];
 
-/// The scheme of a lidar whose shots have so many `marks`.
+/// Returns the scheme of a lidar whose shots have this number of `marks`.
 pub(super) fn scheme(marks: u32) -> &'static str {
     SCHEMES[usize::from(marks == 1)]
 }
@@ -54,22 +54,22 @@ pub struct Candidate {
     pub aperture: f64,
     /// Its words; `None` of one that waits.
     pub words: Option<Separated>,
-    /// Whether it begins to listen later, because its stray light outlasts the blanking of the sensor of the
+    /// True if it begins to listen later, because its stray light outlasts the blanking of the sensor of the
     /// requirements.
     pub is_late: bool,
 }
 
-/// What is built of it for a purpose.
+/// The part of a candidate that is built as a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Built {
     /// All of it.
     Whole,
-    /// So many of its beams, next to each other: every detector has the same work.
+    /// This number of its beams, next to each other. Every detector has the same work.
     Beams(u32),
 }
 
 impl Candidate {
-    /// Whether it waits for the echo of a shot before it fires the next one.
+    /// Returns true if it waits for the echo of a shot before it fires the next one.
     pub fn waits(&self) -> bool {
         self.marks == 1
     }
@@ -114,7 +114,7 @@ impl Candidate {
         })
     }
 
-    /// The sensor of which the table was `changed`, with the step of its converter that goes with its noise.
+    /// Returns the sensor with its table `changed`, and with a step of its converter that suits its noise.
     fn stepped(
         &self,
         required: &Requirements,
@@ -257,12 +257,13 @@ fn family(words: &Separated) -> Value {
 }
 
 impl Requirements {
-    /// Shortest time between the shots of one of so many channels behind a polygon with so many facets, s.
+    /// Returns the shortest time between the shots of one of `beams` channels, s, behind a polygon with
+    /// `facets` facets if there is one.
     pub(super) fn shortest_period(&self, beams: u32, facets: Option<u32>) -> f64 {
         facets.map_or(self.burst, |facets| self.duty(facets)) * self.mean_period(beams)
     }
 
-    /// Mean time between the shots of one of so many channels, s.
+    /// Returns the mean time between the shots of one of `beams` channels, s.
     pub(super) fn mean_period(&self, beams: u32) -> f64 {
         let wanted = &self.wanted;
         let pixels = f64::from(wanted.rows) * f64::from(wanted.columns);

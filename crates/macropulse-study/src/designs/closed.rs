@@ -195,11 +195,12 @@ fn clear(range: f64, period: f64) -> f64 {
     .min(range)
 }
 
-/// With the pulse and the bandwidth with which `dim` needs the least aperture, and the shortest words of such marks.
+/// Returns `dim` with the pulse and the bandwidth that need the least aperture, and the shortest words of
+/// such marks.
 ///
-/// Nelder and Mead's simplex over their logarithms, from where the low-pass is as long as the pulse: the
-/// shorter a pulse the more it stands out of the noise, until the noise of the capacitance, which grows with
-/// the bandwidth, the samples, or a surface aslant end that.
+/// The search is Nelder and Mead's simplex over their logarithms. It starts with a low-pass as long as the
+/// pulse. The shorter a pulse, the more it exceeds the noise. This ends at the noise of the capacitance,
+/// which grows with the bandwidth, at the samples, or at a slanted surface.
 pub(super) fn shaped(
     required: &Requirements,
     dim: &Candidate,

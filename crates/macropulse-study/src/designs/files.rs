@@ -1,4 +1,4 @@
-//! What a search leaves in its folder.
+//! Files that a search leaves in its folder.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,14 +18,14 @@ pub const PAGE: &str = "index.html";
 /// Everything that was found, as numbers.
 const NUMBERS: &str = "design.json";
 
-/// What stands beside the page, but for the sensors.
+/// Pictures and table of the frontier, which stand beside the page.
 const PICTURES: [&str; 3] = ["frontier.svg", "frontier.png", "frontier.csv"];
 
 /// In the folder of trials: which results a search has written, with the digests of their contents.
 const RECORD: &str = "results.json";
 
-/// Makes the folders in which a search keeps what it counted. Results of a search that was here before go:
-/// however this one ends, no file tells of other requirements. What no search has written stays.
+/// Makes the folders in which a search keeps its counts. Results of an earlier search are removed: however
+/// this one ends, no file tells of other requirements. Files that no search has written stay.
 ///
 /// # Errors
 /// If a file stands under the name of a result that no search has written or that was changed since; if they cannot
@@ -63,7 +63,7 @@ pub fn make_room(folder: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// What stands in the record of a folder of `trials`; nothing where there is none.
+/// Returns the record in a folder of `trials`; empty if there is none.
 fn record(trials: &Path) -> BTreeMap<String, String> {
     let text = opened::text(&trials.join(RECORD)).unwrap_or_default();
     serde_json::from_str(&text).unwrap_or_default()

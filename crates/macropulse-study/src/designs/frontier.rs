@@ -1,4 +1,4 @@
-//! Up to which range and rate each way goes: where light ends it, and where time does.
+//! Range and rate that each scheme reaches: the limits by light and by time.
 
 use macropulse::predict::Forecaster;
 use macropulse::units::{range_from_tof, tof_from_range};
@@ -18,13 +18,13 @@ pub const CHANNELS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// How bright targets are, over the one wanted; white at most.
 const BRIGHTNESS: [f64; 3] = [1.0, 3.0, 8.0];
 
-/// Ranges are found to so much of themselves.
+/// Relative tolerance of ranges.
 const TOLERANCE: f64 = 0.01;
 
 /// No nearer and no farther range is looked for, m.
 const RANGES: (f64, f64) = (10.0, 3000.0);
 
-/// Where a coded and a waiting lidar end, with the parts of the best of each and the aperture of the coded
+/// Limits of a coded and a waiting lidar, with the parts of the best of each and the aperture of the coded
 /// one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frontier {
@@ -108,9 +108,9 @@ impl Frontier {
     }
 }
 
-/// How far the light of `candidate` goes, m, of each reflectance, at another rate with as many more channels
-/// or fewer: each shot may be as bright as eyes then allow. Light alone: no other shot is in flight, gate and
-/// field of view are those of the range.
+/// Returns how far the light of `candidate` goes, m, for each reflectance, at another rate. The number of
+/// channels is in proportion to the rate, and each shot is as bright as eyes allow at that rate. Only light
+/// counts: no other shot is in flight, and gate and field of view are those of the range.
 fn reach(
     required: &Requirements,
     candidate: &Candidate,

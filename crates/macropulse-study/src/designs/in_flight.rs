@@ -1,8 +1,8 @@
-//! Single pulses, several of which are in flight: the usual way of laser scanners to fire on without a code.
+//! Single pulses with several in flight: the usual way of laser scanners to fire on without a code.
 //!
-//! The times between pulses are staggered. Of an echo it is not known which of the pulses it belongs to, but only with
-//! the right one do the ranges of neighbours agree \[Rie14\]. No receiver here does that, so what stands here is a bound
-//! in closed form and no design that was simulated.
+//! The times between pulses are staggered. It is unknown which of the pulses an echo belongs to, but the
+//! ranges of neighbours agree only with the right one \[Rie14\]. No receiver here tells pulses apart like
+//! that, so this is a bound in closed form and no design that was simulated.
 
 use macropulse::predict::Blind;
 use macropulse::units::{range_from_tof, tof_from_range};
@@ -12,10 +12,10 @@ use super::bill::Bill;
 use super::candidate::Candidate;
 use super::requirements::Requirements;
 
-/// Times between pulses are spread evenly over this share of their mean: from three quarters of it to five.
+/// Times between pulses are spread evenly over this share of their mean, from 3/4 to 5/4 of it.
 const STAGGER: f64 = 0.5;
 
-/// Ranges agree where they differ by so many standard deviations of a difference at most.
+/// Most standard deviations of a difference by which ranges that agree may differ.
 const AGREE: f64 = 3.0;
 
 /// With how few channels single pulses could do if several of them may be in flight.
@@ -23,7 +23,7 @@ const AGREE: f64 = 3.0;
 pub struct InFlight {
     /// The lidar that waits, with fewer channels.
     pub candidate: Candidate,
-    /// What it is made of.
+    /// Its bill.
     pub bill: Bill,
     /// Time between its pulses, s.
     pub period: f64,
@@ -83,8 +83,8 @@ fn by_chance(precision: f64, period: f64) -> f64 {
     (window / range_from_tof(STAGGER * period)).min(1.0)
 }
 
-/// Neighbours of which each agrees `by_chance`, so that all of them do for one of so many `pulses` no more often than
-/// is `accepted`; as many as there can be where any number is too few.
+/// Returns the number of neighbours that must agree, if each agrees `by_chance`. All of them then agree with
+/// one of the `pulses` no more often than is `accepted`. `u32::MAX` if any number is too few.
 fn neighbours(pulses: f64, by_chance: f64, accepted: f64) -> u32 {
     match by_chance < 1.0 {
         true => ((accepted / pulses).ln() / by_chance.ln()).ceil().max(0.0) as u32,
@@ -96,8 +96,8 @@ fn neighbours(pulses: f64, by_chance: f64, accepted: f64) -> u32 {
 mod tests {
     use super::*;
 
-    /// 150 ns between pulses and 14 of them in flight: a window of 0.2546 m of 11.24 m agrees once in 44, and
-    /// 14·0.02265⁴ = 3.7·10⁻⁶ is rare enough, 14·0.02265³ = 1.6·10⁻⁴ is not.
+    /// 150 ns between pulses and 14 of them in flight: a window of 0.2546 m of 11.24 m agrees once in 44. For
+    /// 10⁻⁴, 14·0.02265⁴ = 3.7·10⁻⁶ is rare enough, 14·0.02265³ = 1.6·10⁻⁴ is not.
     #[test]
     fn wrong_pulses_need_more_neighbours_to_agree_by_chance() {
         let chance = by_chance(0.03, 150e-9);

@@ -1,4 +1,4 @@
-//! What a search found, for programs.
+//! The findings of a search as JSON, for programs.
 
 use serde_json::{Value, json};
 
@@ -63,7 +63,7 @@ impl Found {
     }
 }
 
-/// What all channels take together; of what there is not, null.
+/// Returns the quantities of all channels together; missing ones are null.
 fn bill(it: &Bill) -> Value {
     json!({
         "converter": it.converter.name(),

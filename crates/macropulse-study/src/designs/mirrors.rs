@@ -6,7 +6,7 @@ use super::in_flight::InFlight;
 use super::requirements::Requirements;
 use super::trial::Trial;
 
-/// A polygon with so many facets, and what each lidar takes behind it.
+/// A polygon, and the needs of each lidar behind it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mirror {
     /// Facets.
@@ -17,10 +17,11 @@ pub struct Mirror {
     pub sides: [Option<Side>; 3],
 }
 
-/// What a lidar takes behind a polygon.
+/// Needs of a lidar behind a polygon.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Side {
-    /// Fewest channels that leave it its time between shots; a rational number, of which rows ask for the next divisor.
+    /// Fewest channels that leave it its time between shots. This is a rational number; the number of rows
+    /// asks for its next divisor.
     pub channels: f64,
     /// Diameter of the polygon that holds its aperture, m.
     pub diameter: f64,

@@ -1,5 +1,5 @@
-//! Lidars that do what is required: all that could be built of the parts allowed, in closed form; the best
-//! of them, simulated; and up to where waiting for echoes is better than a code.
+//! Lidars that meet requirements. Closed forms assess all that could be built of the parts allowed, and the
+//! best of them are simulated. A frontier tells up to where waiting for echoes is better than a code.
 
 mod ablation;
 mod bill;
@@ -61,7 +61,7 @@ pub enum Error {
     View(#[from] crate::view::Error),
 }
 
-/// What stands in the way of a candidate.
+/// Reason why a candidate does not meet the requirements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
     /// It would have to wait longer for an echo than it has.

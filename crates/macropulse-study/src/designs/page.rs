@@ -1,4 +1,4 @@
-//! What a search found, as a page with the picture of the frontier.
+//! The findings of a search, as a page with the picture of the frontier.
 
 use super::frontier::{CHANNELS, Frontier};
 use super::listing::{share, told};

@@ -11,7 +11,7 @@ use serde::Deserialize;
 pub struct Part {
     /// Name by which it is chosen.
     pub name: String,
-    /// Where its figures come from.
+    /// Source of its figures.
     #[serde(default)]
     pub source: String,
     /// Wavelength at which it works, nm.

@@ -1,4 +1,4 @@
-//! What is wanted of a lidar, and of which parts it may be made: a TOML file.
+//! Requirements on a lidar and the parts it may be made of: a TOML file.
 
 use std::path::{Path, PathBuf};
 
@@ -18,11 +18,11 @@ use super::parts::{self, Part};
 pub struct Requirements {
     /// Short name.
     pub name: String,
-    /// What is wanted.
+    /// Requirements on the lidar.
     pub wanted: Wanted,
     /// Sun and air.
     pub environment: Environment,
-    /// What the lidar may be made of.
+    /// Parts the lidar may be made of.
     pub parts: Parts,
     /// The photodiodes to choose from.
     pub detectors: Vec<Part>,
@@ -30,7 +30,7 @@ pub struct Requirements {
     pub(super) template: Table,
     /// The shortest over the mean time between shots of its channels, where no polygon decides that.
     pub(super) burst: f64,
-    /// Where files lie that the template names.
+    /// Folder of the files that the template names.
     pub(super) folder: PathBuf,
     /// The text of the file: what decides all that is found.
     pub text: String,
@@ -75,7 +75,8 @@ pub struct Wanted {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parts {
-    /// Ready sensor or file, a raster with a sampled detector, of which all is taken that is not searched.
+    /// Ready sensor or file: a raster with a code and a sampled detector. It gives all values that are not
+    /// searched.
     #[serde(default = "usual::sensor")]
     pub sensor: String,
     /// Names of photodiodes: of the table that comes with the program, or of `[[detector]]`.
@@ -107,7 +108,7 @@ pub struct Parts {
     pub facets: Vec<u32>,
 }
 
-/// What is taken where a file leaves something open.
+/// Defaults of keys that a file leaves out.
 mod usual {
     pub(super) fn pd() -> f64 {
         0.9
@@ -162,9 +163,9 @@ struct File {
     /// Sun and air: the name of a ready environment; `clear-day` unless it is given.
     #[serde(default)]
     environment: Option<String>,
-    /// What the lidar must do.
+    /// Requirements on the lidar.
     wanted: Wanted,
-    /// What it may be made of.
+    /// Parts the lidar may be made of.
     parts: Parts,
     /// Photodiodes beside those that come with the program.
     #[serde(default, rename = "detector")]
@@ -183,7 +184,7 @@ const VERSION: u32 = 1;
 const MOST_MARKS: u32 = 8;
 
 impl Requirements {
-    /// What the file at `path` requires.
+    /// Reads the requirements in the file at `path`.
     ///
     /// # Errors
     /// Says in one sentence what is wrong, and where.
@@ -195,8 +196,8 @@ impl Requirements {
         Self::from_toml(&text, &name, path.parent().unwrap_or(Path::new("")))
     }
 
-    /// What `text` requires. `origin` stands in messages for the file; `folder` is where the sensor is
-    /// looked for that it names.
+    /// Reads the requirements in `text`. `origin` stands in messages for the file. A sensor that it names is
+    /// looked for in `folder`.
     ///
     /// # Errors
     /// As [`Requirements::open`].

@@ -1,5 +1,5 @@
-//! Scenes on which candidates are tried: a target at the range wanted all around, and a field of tiles, each
-//! of some pixels, at ranges that have nothing to do with each other.
+//! Scenes on which candidates are tried: a target at the range wanted all around, and a field of tiles. Each
+//! tile covers some pixels, and the ranges of tiles are independent of each other.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,15 +11,15 @@ use serde::{Deserialize, Serialize};
 use super::Error;
 use super::requirements::Requirements;
 
-/// What a candidate is tried on.
+/// A scene on which candidates are tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scenery {
     /// A target of the reflectance wanted just within the range wanted, in every direction.
     Wall,
-    /// Tiles of one to twenty-three pixels of a row, a quarter of them open sky, the others anywhere from
-    /// 4 m to the farthest thing that may answer, and as bright as the target, three and eight
-    /// times as bright: what a street is, without any order that could help.
+    /// Tiles of one to twenty-three pixels of a row. A quarter of them are open sky; the others stand
+    /// anywhere from 4 m to the farthest thing that may answer. They are as bright as the target, three or
+    /// eight times as bright. This is like a street, without any order that could help.
     Tiles,
 }
 
@@ -38,7 +38,7 @@ const BRIGHTNESS: [f64; 3] = [1.0, 3.0, 8.0];
 /// Reflectance of the brightest tile at most.
 const BRIGHTEST: f64 = 0.9;
 
-/// The wall stands at so much of the range wanted: within the gate by more than any error.
+/// Range of the wall, over the range wanted. It lies within the gate by more than any error.
 const WITHIN: f64 = 0.993;
 
 /// A scene, and what is known of each pixel without casting a ray.
@@ -66,7 +66,7 @@ impl Scenery {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::Wall, Self::Tiles];
 
-    /// What it is called.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Wall => "wall",
@@ -74,7 +74,7 @@ impl Scenery {
         }
     }
 
-    /// The scene for so many rows of pixels.
+    /// Makes the scene for `rows` rows of pixels.
     pub(super) fn set(self, required: &Requirements, rows: u32, seed: u64) -> Result<Set, Error> {
         match self {
             Self::Wall => wall(required, rows),
@@ -160,7 +160,8 @@ fn tiles(required: &Requirements, rows: u32, seed: u64) -> Result<Set, Error> {
     Ok(Set { scene: made(&format!("{text}{objects}"), &meshes)?, columns, ranges })
 }
 
-/// Pixels of a facet: at 300 m one of so many pixels of a milliradian lies less than a millimetre within.
+/// Pixels of a facet. At 300 m, a facet of four pixels of a milliradian lies less than a millimetre within
+/// the sphere.
 const FACET: usize = 4;
 
 fn place(range: f64, azimuth: f64, elevation: f64) -> [f64; 3] {

@@ -24,9 +24,9 @@ use super::trial::{Bench, PIXELS, Trial};
 /// Shots of a channel may follow each other as soon as that, s: three marks 8 ns apart fill less.
 const SOONEST: f64 = 60e-9;
 
-/// Pulse and bandwidth of coded shots are chosen for shots of a channel that are so far apart, s: sooner, too
-/// many meet, as an independent study of such lidars and the trials here show; later, the mirror moves less in
-/// a word, and marks are smeared less.
+/// Time between shots of a channel, s, for which pulse and bandwidth of coded shots are chosen. At shorter
+/// times too many meet, as an independent study of such lidars and the trials here show. At longer times the
+/// mirror moves less in a word, and marks are smeared less.
 const APART: f64 = 150e-9;
 
 /// Halvings between the least aperture of closed forms, which ignore the light of others, and the largest

@@ -1,4 +1,4 @@
-//! The words of a candidate: of those that are tried the ones of which fewest echoes are lost to own light.
+//! The words of a candidate: of those tried, the ones that lose the fewest echoes to own stray light.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -14,22 +14,23 @@ use super::candidate::{Candidate, WORDS};
 use super::keys::number;
 use super::requirements::Requirements;
 
-/// Words may last such a share of the time between shots of a channel, or the shortest there are, if these last
-/// longer. The mirror moves on during a word, and where it meets two surfaces that are not equally far some points
-/// are wrong: with 16 beams, words of 0.7 to 0.8 of that time had 23 to 102 points of 36 686 wrong, those of 0.57 had
-/// 6, and 37 are what the example accepts.
+/// Longest words, over the time between shots of a channel; the shortest that there are may last longer. The
+/// mirror moves on during a word, and some points are wrong where it meets two surfaces at different ranges.
+/// With 16 beams, words of 0.7 to 0.8 of that time had 23 to 102 wrong points of 36 686. Words of 0.57 had 6,
+/// and the example accepts 37.
 const LONGEST: f64 = 0.6;
 
-/// So many families are drawn of each length. With 20 beams, marks of 860 ps behind 278 MHz and 382 chips the best of
-/// 40 loses one shot in ten at its worst range, the best of 12 one in five.
+/// Families drawn of each length. With 20 beams, marks of 860 ps behind 278 MHz and 382 chips, the best of 40
+/// loses one shot in ten at its worst range. The best of 12 loses one in five.
 const SEEDS: u64 = 40;
 
-/// Up to so many words later echoes are looked after when words are drawn. With 16 beams, where four are sent before
-/// an echo from 150 m is back, words of 0.84 of the time between shots still lose one in five somewhere.
+/// Echoes up to this number of words later are looked after when words are drawn. With 16 beams, where four
+/// are sent before an echo from 150 m is back, words of 0.84 of the time between shots still lose one in five
+/// somewhere.
 const MOST_LATER: u32 = 4;
 
-/// Distances between marks differ by so many lengths (full width at half maximum) of a mark behind its
-/// amplifier: two marks that meet two others by less than that look like the same.
+/// Least difference between distances of marks, in lengths (full width at half maximum) of a mark behind its
+/// amplifier. Two marks that meet two others by less than that look like the same.
 const APART: f64 = 2.0;
 
 /// Echoes that are lost because too few of their marks are told; the fewer at the worst range the better.
@@ -53,7 +54,7 @@ impl Requirements {
         let design = bare.unlimited(self)?;
         let blind = design.receiver.method.sampling().and_then(Blind::at_most);
         let chips = |time: f64| (time / self.chip() * (1.0 - 1e-12)).ceil() as u32;
-        // Of a Gaussian low-pass 0.312 over its bandwidth (full width at half maximum).
+        // The response of a Gaussian low-pass has a full width at half maximum of 0.312 over its bandwidth.
         let mark = bare.pulse.hypot(0.312 / bare.bandwidth);
         let apart = chips(APART * mark);
         let tick = design.clock.tick_fs as f64 * 1e-15;
@@ -71,9 +72,10 @@ impl Requirements {
         Err(Error::Asked(format!("there are no {WORDS} words of {weight} marks")))
     }
 
-    /// `candidate`, which has the shortest words, with those of which no echo is lost to own light from the nearest
-    /// range to the one wanted, the shorter the better; where there are none as long as words may be, and as a surface
-    /// aslant lets them be, with those of which fewest are lost at the worst range.
+    /// Returns `candidate`, which has the shortest words, with the best ones. These are the shortest words
+    /// that lose no echo to own stray light, from the nearest range to the one wanted. If there are none,
+    /// they are those that lose the fewest echoes at the worst range. `LONGEST` and a slanted surface limit
+    /// their length.
     pub(super) fn with_best_words(&self, candidate: &Candidate) -> Result<Candidate, Error> {
         let Some(shortest) = candidate.words else { return Ok(candidate.clone()) };
         let design = candidate.unlimited(self)?;
@@ -143,7 +145,7 @@ impl Requirements {
     }
 }
 
-/// By so many chips words are tried longer.
+/// Returns the chips by which the next words tried are longer.
 fn longer(length: u32) -> u32 {
     length.div_ceil(16)
 }
@@ -155,8 +157,8 @@ mod tests {
     use super::super::closed::DIM;
     use super::*;
 
-    /// Marks of 510 ps behind 519 MHz blind for 22 ticks. With 32 beams there are words of which none are lost, with
-    /// 16, of which twice as many are under way, there are none, but some that lose less than the shortest.
+    /// Marks of 510 ps behind 519 MHz blind for 22 ticks. With 32 beams, the best words lose no echo. With
+    /// 16, twice the number of words are under way, and the best lose some, but fewer than the shortest.
     #[test]
     fn words_lose_as_little_to_own_light_as_any_that_are_tried() {
         let text = include_str!("../../../../docs/examples/requirements.toml");

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Whether a claim holds.
+/// Verdict on a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
@@ -56,17 +56,17 @@ pub struct Claim {
     pub id: &'static str,
     /// Section, table or figure of the paper.
     pub section: &'static str,
-    /// What it says.
+    /// The claim in words.
     pub claim: &'static str,
     /// The paper's number or word.
     pub paper: &'static str,
-    /// What was measured, and how.
+    /// The measurement and its method.
     pub measured: String,
-    /// Whether it holds.
+    /// Verdict on the claim.
     pub verdict: Verdict,
 }
 
-/// What the paper says, before it is judged: `id`, section, claim, and its number or word.
+/// Returns a claim of the paper before it is judged: `id`, section, claim, and its number or word.
 pub(super) fn said(
     id: &'static str,
     section: &'static str,

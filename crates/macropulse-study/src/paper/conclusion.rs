@@ -5,7 +5,7 @@ use super::claim::Claim;
 use super::tables;
 use crate::view::{Align, Cell, Table};
 
-/// What the sentence of a row needs left out, and what replaces it.
+/// Returns the idealisations that the sentence of a row needs, and what replaces it.
 fn beside(claim: &Claim, findings: &Findings) -> (&'static str, String) {
     let found = &findings.measured.on_paper;
     let outlook = &found.outlook;

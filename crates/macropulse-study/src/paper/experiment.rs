@@ -30,7 +30,7 @@ pub struct Trial {
     pub cloud: PointCloud,
     /// How the pixels came out.
     pub score: Score,
-    /// What was counted on the way.
+    /// Counts of the run.
     pub tally: Tally,
     /// The samples that geometry predicts on the car.
     pub predicted: Prediction,
@@ -132,8 +132,8 @@ pub(super) fn trial(
     })
 }
 
-/// Median of the range errors of the points on the car, which those that stand on a sidelobe of the
-/// code do not move, and the root of their mean square, m.
+/// Returns the median and the root mean square of the range errors of the points on the car, m. Points on a
+/// sidelobe of the code do not move the median.
 fn range_errors(cloud: &PointCloud, scene: &Scene) -> (f64, f64) {
     let truth = &cloud.truth.returns;
     let on_car = (0..cloud.range.len()).filter(|&at| {

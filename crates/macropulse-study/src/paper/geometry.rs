@@ -31,7 +31,7 @@ pub struct Prediction {
     pub cut_off: f64,
 }
 
-/// Where a target is looked for.
+/// Directions in which a target is looked for, rad.
 const AHEAD: Extent = Extent { azimuth: [-0.3, 0.3], elevation: [-0.3, 0.3] };
 
 /// The prediction for the target objects of `scene`.

@@ -38,7 +38,7 @@ pub enum Error {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// It was asked to stop.
@@ -92,9 +92,9 @@ pub struct Findings {
     pub trials: Vec<Trial>,
     /// The receivers compared.
     pub comparisons: Vec<Comparison>,
-    /// What the claims are judged by.
+    /// Numbers by which the claims are judged.
     pub measured: Measured,
-    /// What the paper says, and whether it holds.
+    /// Claims of the paper, with their verdicts.
     pub claims: Vec<Claim>,
 }
 

@@ -18,7 +18,7 @@ use macropulse::units::{s_from_fs, tof_from_range};
 /// Width of a range image, px.
 const WIDTH: usize = 560;
 
-/// What is shown around the car, m: half the width, above and below the horizon.
+/// Area shown around the car, m: half the width, height above and below the horizon.
 const AROUND: (f64, f64, f64) = (2.4, 0.3, 2.9);
 
 /// Table 2 as a picture: the chips of every code word, one line each.

@@ -47,7 +47,7 @@ const ROWS: std::ops::Range<u64> = 252..324;
 pub struct Comparison {
     /// The sensor.
     pub sensor: &'static str,
-    /// What the detector loses.
+    /// The detector, named by its losses.
     pub detector: &'static str,
     /// The receiver.
     pub receiver: &'static str,

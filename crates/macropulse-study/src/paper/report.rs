@@ -38,7 +38,7 @@ pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
     Ok(page)
 }
 
-/// What lies beside the page: the tables, and of each trial a page to explore its cloud.
+/// Returns the files beside the page: the tables, and for each trial a page to explore its cloud.
 fn files(findings: &Findings) -> Vec<String> {
     let tables = super::FILES[..3].iter().map(|file| (*file).to_owned());
     let pages = findings.trials.iter().map(|trial| {
@@ -205,7 +205,7 @@ fn conclusion(findings: &Findings) -> Section {
         .table(conclusion::table(findings))
 }
 
-/// What is left of the title: whether pulse coding gives an improved refresh rate, and at what price.
+/// Returns the verdict on the title: whether pulse coding gives an improved refresh rate, and at what price.
 fn verdict(findings: &Findings) -> Section {
     let outlook = &findings.measured.on_paper.outlook;
     let range = findings.measured.on_paper.timing.rated_range;

@@ -16,7 +16,7 @@ use macropulse::sim;
 /// known to 0.5 %.
 const SHOTS: u64 = 20_000;
 
-/// What a sensor sees of a wall that is square on in all directions.
+/// Detection and range error of a sensor at a wall that is square on in all directions.
 #[derive(Debug, Clone)]
 pub struct Wall {
     /// The sensor.

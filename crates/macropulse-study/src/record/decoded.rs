@@ -15,11 +15,11 @@ pub struct Decoded<'a> {
     pub design: &'a Design,
     /// Sun and air by which intensity is measured.
     pub environment: &'a Environment,
-    /// What the shots, and the ticks, samples or histograms, were read from.
+    /// Names of the inputs: of the shots, and of the ticks, samples or histograms.
     pub inputs: [&'a str; 2],
     /// How far the run has come.
     pub state: State,
-    /// Scans of which a shot was decoded.
+    /// Scans with a decoded shot.
     pub scans: u64,
     /// Shots whose returns are wanted.
     pub shots: u64,
@@ -29,7 +29,7 @@ pub struct Decoded<'a> {
     pub returns: u64,
     /// Macropulses refused, by reason.
     pub rejects: [u64; Reject::ALL.len()],
-    /// What a reader should know.
+    /// Warnings for the reader.
     pub warnings: &'a [String],
     /// Names of the files written.
     pub files: &'a [String],

@@ -1,4 +1,4 @@
-//! What a run has left in a folder, and which files of it hold the clouds.
+//! The files that a run has left in a folder, and which of them hold the clouds.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -10,11 +10,11 @@ use serde_json::Value;
 
 use super::{Error, MANIFEST};
 
-/// Endings of the files in a folder that hold clouds, the one that keeps most first. What ends as one
-/// of the last may be many things: there the name must begin as that of a scan.
+/// Endings of the files in a folder that hold clouds, the one that keeps most first. Files with one of the
+/// last endings may hold anything, so their names must begin like that of a scan.
 const ENDINGS: [&str; 9] = ["pcd", "ply", "las", "laz", "e57", "mcap", "npy", "csv", "bin"];
 
-/// How many of the endings are of clouds alone.
+/// Number of the endings that belong to clouds alone.
 const OF_CLOUDS: usize = 6;
 
 /// A folder that a run has left, or any other with clouds.
@@ -22,7 +22,7 @@ const OF_CLOUDS: usize = 6;
 pub struct Left {
     /// Its manifest, if it has one and the run came to its end.
     pub manifest: Option<Value>,
-    /// Whether its manifest says that a run is still under way, or was killed.
+    /// True if its manifest says that a run is still under way, or was killed.
     pub is_unfinished: bool,
     /// Names of its files: those of the manifest, or else all that may hold clouds.
     pub files: Vec<String>,
@@ -31,7 +31,7 @@ pub struct Left {
 }
 
 impl Left {
-    /// What is in `folder`.
+    /// Reads the contents of `folder`.
     ///
     /// # Errors
     /// [`Error::Unreadable`] if it cannot be listed, [`Error::Manifest`] if its manifest is none.
@@ -48,8 +48,9 @@ impl Left {
         Ok(Self { manifest, is_unfinished, files, outside })
     }
 
-    /// Names of the files with its clouds. Of several files of one cloud, which differ in their
-    /// endings, the one that keeps most; files with all scans of a run only where no others hold them.
+    /// Returns the names of the files with its clouds. If several files with different endings hold one
+    /// cloud, the one that keeps most is taken. Files with all scans of a run are taken only if no other file
+    /// holds clouds.
     pub fn clouds(&self) -> Vec<&String> {
         let mut chosen: Vec<(usize, &String)> = Vec::new();
         for file in &self.files {
@@ -64,15 +65,15 @@ impl Left {
         let is_of_run = |file: &String| file.to_lowercase().ends_with(".mcap");
         let has_others = chosen.iter().any(|(_, file)| !is_of_run(file));
         chosen.retain(|(_, file)| !has_others || !is_of_run(file));
-        // Of one run in several kinds of messages, the first: they sort with what we read before the
-        // rest.
+        // If a run is stored in several kinds of messages, keep the first file: the kind that we read sorts
+        // before the rest.
         chosen.dedup_by(|(_, one), (_, other)| is_of_run(one) && is_of_run(other));
         chosen.into_iter().map(|(_, file)| file).collect()
     }
 }
 
-/// What the files of one cloud have in common: their name without an ending, and without what tells
-/// two of the same ending apart.
+/// Returns the part of the name that the files of one cloud share: without the ending, and without the suffix
+/// that tells two files of the same ending apart.
 fn cloud_of(file: &str) -> String {
     let stem = Path::new(file).with_extension("");
     let stem = stem.to_string_lossy();
@@ -96,7 +97,8 @@ fn manifest(folder: &Path) -> Result<Option<Value>, Error> {
     manifest.map(Some).map_err(|cause| Error::Manifest { path, cause })
 }
 
-/// Whether what is called `name` in `folder` lies in it. A name without a file leads nowhere else.
+/// Returns true if the path `name` in `folder` does not lead out of it. A name without a file leads nowhere
+/// else.
 fn is_inside(folder: &Path, name: &str) -> bool {
     let is_below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
     let leads_out = || match (folder.canonicalize(), folder.join(name).canonicalize()) {
@@ -129,8 +131,8 @@ fn unreadable(path: &Path, cause: std::io::Error) -> Error {
     Error::Unreadable { path: path.to_owned(), cause }
 }
 
-/// The clouds of a file, or of all files of a folder, one after the other; of each it has one in
-/// memory.
+/// The clouds of a file, or of all files of a folder, one after the other. One of them is in memory at a
+/// time.
 pub struct CloudsAt {
     /// Files that are still to be opened, the next one last.
     left: Vec<PathBuf>,
@@ -157,12 +159,12 @@ impl CloudsAt {
         Ok(Self { left: files, open: None, reading })
     }
 
-    /// What of the file that was read last is not in its clouds.
+    /// Returns the contents of the file read last that are not in its clouds.
     pub fn left_out(&self) -> Option<&LeftOut> {
         self.open.as_ref().map(Clouds::left_out)
     }
 
-    /// The next cloud, with the names of what it has the numbers of.
+    /// Returns the next cloud, with the names that belong to its numbers.
     ///
     /// # Errors
     /// If its file cannot be read.

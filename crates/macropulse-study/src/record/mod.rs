@@ -1,4 +1,4 @@
-//! What a run leaves on the disk: clouds, pictures, and the manifest by which it can be repeated.
+//! Files that a run leaves on the disk: clouds, pictures, and the manifest by which it can be repeated.
 
 mod decoded;
 mod explanation;
@@ -46,9 +46,9 @@ pub enum Error {
     /// A folder or a manifest could not be read.
     #[error("{}: cannot be read: {cause}", path.display())]
     Unreadable {
-        /// What was to be read.
+        /// The path that cannot be read.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         cause: std::io::Error,
     },
     /// A manifest is none.
@@ -56,7 +56,7 @@ pub enum Error {
     Manifest {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The error of the JSON reader.
         cause: serde_json::Error,
     },
     /// A folder holds no cloud.
@@ -167,7 +167,7 @@ pub struct Run<'a> {
     pub state: State,
     /// Scans that are complete.
     pub scans: u64,
-    /// What was counted on the way.
+    /// Counts of the run, stage by stage.
     pub tally: &'a Tally,
     /// How the pixels came out.
     pub score: &'a Score,
@@ -257,8 +257,8 @@ pub fn manifest(run: &Run) -> Manifest {
     manifest
 }
 
-/// What is not modelled of a sensor in an environment, as manifests have it; nothing where the
-/// sensor cannot be simulated.
+/// Effects that are not modelled for a sensor in an environment, as manifests have them. Empty if the sensor
+/// cannot be simulated.
 pub fn not_modelled(design: &Design, environment: &Environment) -> Entries<serde_json::Value> {
     let mut entries = Entries::default();
     for left in unmodelled::of(design, environment).unwrap_or_default() {
@@ -268,7 +268,7 @@ pub fn not_modelled(design: &Design, environment: &Environment) -> Entries<serde
     entries
 }
 
-/// What a reader should know of a sensor in a scene before it is run.
+/// Warnings to read before a sensor runs in a scene: those of the sensor, of the scene, and of the air.
 pub fn warnings(design: &Design, scene: &Scene) -> Vec<String> {
     let of_air = unmodelled::warnings(design, &scene.environment);
     [&design.warnings[..], &scene.warnings, &of_air].concat()
@@ -284,7 +284,7 @@ pub fn surroundings(environment: &Environment) -> Surroundings {
     Surroundings { name: environment.name.clone(), conditions: environment.conditions() }
 }
 
-/// What the file of a sensor leaves open, by key.
+/// Values for the keys that the file of a sensor leaves open.
 pub fn defaults(design: &Design) -> Entries<serde_json::Value> {
     let value = |typed: &str| serde_json::to_value(toml_value(typed)).unwrap_or_default();
     let defaults = design.defaults.iter();

@@ -72,7 +72,7 @@ impl Page {
     }
 }
 
-/// What a page of a run is called, by its `manifest`; nothing if that names no sensor.
+/// Title of the page of a run, from its `manifest`; `None` if that names no sensor.
 pub fn title(manifest: &Value) -> Option<String> {
     let name = |what: &str| manifest[what]["name"].as_str();
     Some(titled(name("sensor")?, name("scene")))

@@ -1,4 +1,4 @@
-//! What is varied: a key and its values.
+//! A varied key and its values.
 
 use std::str::FromStr;
 
@@ -58,12 +58,12 @@ impl Axis {
         Ok(Self { key: key.to_owned(), values, spread })
     }
 
-    /// Whether it is of the scene or its environment, not of the sensor.
+    /// True if the key belongs to the scene or its environment, not to the sensor.
     pub(super) fn is_of_scene(&self) -> bool {
         !apart(&[(self.key.clone(), String::new())]).of_scene.is_empty()
     }
 
-    /// Where the value of number `index` lies; names lie at their numbers.
+    /// Place of value number `index` on the axis: the value itself, or `index` for names.
     pub fn place(&self, index: usize) -> f64 {
         let number = self.values.get(index).and_then(|value| value.parse().ok());
         number.filter(|_| self.spread != Spread::Names).unwrap_or(index as f64)
@@ -189,7 +189,7 @@ fn text(value: f64) -> String {
     }
 }
 
-/// Whether two values are one, though they may be written differently.
+/// True if two values are equal, even if they are written differently.
 fn is_same(one: &str, other: &str) -> bool {
     match (one.parse::<f64>(), other.parse::<f64>()) {
         (Ok(one), Ok(other)) => one == other,

@@ -26,14 +26,14 @@ const DESCRIPTION: &str = "sweep.json";
 /// One point with one seed.
 #[derive(Debug, Clone, Copy)]
 pub struct Job<'a> {
-    /// What is measured.
+    /// The combination of values that is measured.
     pub point: &'a Point,
     /// The seed of its random numbers.
     pub seed: u64,
     pub(super) scene: &'a Scene,
 }
 
-/// What is counted of a job. All of it is the same on every machine.
+/// Counts of a job. All of them are the same on every machine.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Counted {
@@ -51,7 +51,7 @@ pub struct Counted {
     pub peak_busy: u32,
     /// Range errors of the right points, and of more if they are spread wider.
     pub right: RangeError,
-    /// Where the last light was lost if there is not a single return.
+    /// The stage at which the last light was lost, if there is not a single return.
     pub empty: Option<String>,
 }
 
@@ -105,7 +105,7 @@ impl Job<'_> {
         folder_of_jobs(folder).join(format!("{}.json", self.name()))
     }
 
-    /// What was counted, from its file.
+    /// Reads the counts from the file of the job.
     pub(super) fn read(&self, folder: &Path) -> Result<Counted, Error> {
         let path = self.path(folder);
         let refused = |why: &str| {
@@ -123,7 +123,7 @@ impl Job<'_> {
 }
 
 impl Counted {
-    /// Whether the counts fit together and to the pixels measured.
+    /// True if the counts agree with each other and with the number of `pixels` measured.
     fn is_possible(&self, pixels: u64) -> bool {
         let Self { score, detections, lost, .. } = self;
         let sum = score.pixels.iter().try_fold(0_u64, |sum, count| sum.checked_add(*count));
@@ -136,7 +136,7 @@ impl Counted {
 }
 
 impl Plan {
-    /// Whether `folder` is free for this sweep, or holds it already.
+    /// Checks that `folder` is free for this sweep, or holds it already.
     ///
     /// # Errors
     /// If it holds another sweep, or the results of another command.

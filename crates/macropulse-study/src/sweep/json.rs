@@ -1,19 +1,19 @@
-//! What programs are told of a sweep.
+//! Sweeps as JSON, for other programs.
 
 use serde_json::{Value, json};
 
 use super::{Plan, Shard, Table};
 
 impl Plan {
-    /// What was asked for, and the rows of its table.
+    /// The request, and the rows of its table.
     pub fn json(&self, table: &Table) -> Value {
         let mut told = self.asked();
         told["rows"] = table.json();
         told
     }
 
-    /// What was asked for, and which scans are `missing`: how many, and of the parts like `shard` those
-    /// that have any.
+    /// The request, the number of scans that are `missing`, and the parts that have any of them. The sweep is
+    /// divided as for `shard`.
     pub fn json_of_missing(&self, missing: &[usize], shard: Shard) -> Value {
         let mut told = self.asked();
         told["missing"] = missing.len().into();

@@ -73,8 +73,8 @@ impl Metric {
         }
     }
 
-    /// What it is, in a line. An echo is a pixel with a surface within the range gate whose shot
-    /// carried light.
+    /// Its meaning, in a line. An echo is a pixel with a surface within the range gate whose shot carried
+    /// light.
     pub fn meaning(self) -> &'static str {
         match self {
             Self::Pd => "share of the echoes that gave a return, right or near (within 0.35 m)",

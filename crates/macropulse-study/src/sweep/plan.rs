@@ -17,17 +17,17 @@ use macropulse::scene::{Changes, Room, Scene, apart};
 /// More jobs than this are taken for a slip.
 const MOST_JOBS: u64 = 100_000;
 
-/// What is asked for.
+/// Request for a sweep.
 #[derive(Debug, Clone)]
 pub struct Request {
     /// Ready sensors or files; several of them are varied like a key.
     pub sensors: Vec<String>,
     /// Ready scene or file.
     pub scene: String,
-    /// What is changed of all sensors, and, behind `scene:` or of its environment, of the scene:
-    /// dotted keys and values.
+    /// Changes as dotted keys and values. Keys behind `scene:` or of the environment change the scene, the
+    /// others change all sensors.
     pub set: Vec<(String, String)>,
-    /// What is varied.
+    /// The varied keys with their values.
     pub vary: Vec<Axis>,
     /// The seeds with which every point is measured.
     pub seeds: Range<u64>,
@@ -38,7 +38,7 @@ pub struct Request {
 /// Every combination of the values that are varied, with every seed. All of it is valid.
 #[derive(Debug)]
 pub struct Plan {
-    /// What is varied: along x, and from curve to curve.
+    /// The varied keys: the first along x, the second from curve to curve.
     pub axes: Vec<Axis>,
     /// All combinations; the values of the last axis change fastest.
     pub points: Vec<Point>,
@@ -71,13 +71,13 @@ pub struct Point {
     pub not_modelled: Entries<Value>,
     /// Values that the file leaves open, by key.
     pub defaults: Entries<Value>,
-    /// What was assumed in reading the scene.
+    /// Assumptions made in reading the scene.
     pub assumed: Vec<String>,
     /// Warnings of the sensor and of the scene.
     pub warnings: Vec<String>,
     /// The whole sensor as TOML.
     pub(super) text: String,
-    /// What is measured of a scan.
+    /// The measured parts of a scan.
     pub(super) bands: Vec<Band>,
     /// Number of its scene.
     scene_index: usize,
@@ -153,7 +153,7 @@ impl Plan {
         self.seeds.clone().map(move |seed| Job { point, scene, seed })
     }
 
-    /// What makes the sweep another one if it changes, scores apart; part of the manifest.
+    /// Everything that makes the sweep another one if it changes, except the scores. Part of the manifest.
     pub(super) fn description(&self) -> Value {
         let points: Vec<Value> = self
             .points
@@ -196,7 +196,7 @@ impl Point {
         let sensor = varied.map(|(_, name)| name).or(request.sensors.first());
         let sensor = sensor.map_or("", String::as_str);
         let design = Design::open(sensor, &of_sensor).map_err(|error| {
-            // What is wrong as well without what is varied is said as such.
+            // An error that occurs without the varied values as well is reported without them.
             match Design::open(sensor, &apart(&request.set).of_sensor) {
                 Err(plain) if plain == error => plain.into(),
                 _ => at(axes, values, &error.to_string()),
@@ -232,7 +232,7 @@ impl Point {
     }
 }
 
-/// What is varied: the keys, and then the sensors if there are several.
+/// The varied keys, and then the sensors if there are several.
 fn axes(request: &Request) -> Result<Vec<Axis>, Error> {
     let mut axes = request.vary.clone();
     if request.sensors.is_empty() {
@@ -281,7 +281,7 @@ fn changes(request: &Request, axes: &[Axis], values: &[String]) -> Changes {
     apart(&request.set.iter().cloned().chain(varied).collect::<Vec<_>>())
 }
 
-/// What is wrong with one combination of values.
+/// The error `message` of one combination of values.
 fn at(axes: &[Axis], values: &[String], message: &str) -> Error {
     let keys = axes.iter().zip(values).map(|(axis, value)| format!("{} = {value}", axis.key));
     // Designs know changes by the option of other commands.
@@ -289,8 +289,8 @@ fn at(axes: &[Axis], values: &[String], message: &str) -> Error {
     Error::Asked(format!("with {}: {message}", keys.collect::<Vec<_>>().join(", ")))
 }
 
-/// As many short bands of the first scan as it takes for `shots`, evenly over the scan; all of it if `None`, or if
-/// it has no more.
+/// Short bands of the first scan, about `shots` shots in all, evenly over the scan. All bands of it if
+/// `shots` is `None`, or if it has no more shots.
 fn spread(design: &Design, shots: Option<u64>) -> Vec<Band> {
     let Some(shots) = shots.filter(|shots| *shots < design.shots_per_scan()) else {
         return bands(design, 0).collect();
@@ -298,7 +298,7 @@ fn spread(design: &Design, shots: Option<u64>) -> Vec<Band> {
     let all: Vec<Band> = short_bands(design, 0).collect();
     let longest = all.first().map_or(1, |band| band.shots.max(1));
     let wanted = (shots.div_ceil(longest).max(1) as usize).min(all.len());
-    // The middle of each of as many equal parts.
+    // The middle of each of `wanted` equal parts.
     (0..wanted).map(|part| all[(2 * part + 1) * all.len() / (2 * wanted)]).collect()
 }
 

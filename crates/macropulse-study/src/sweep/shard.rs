@@ -15,12 +15,12 @@ impl Shard {
     /// All jobs.
     pub const WHOLE: Self = Self { index: 0, of: 1 };
 
-    /// Whether the job of number `job`, from 0, belongs to it.
+    /// True if the job of number `job`, from 0, belongs to this shard.
     pub fn has(self, job: usize) -> bool {
         job % self.of == self.index
     }
 
-    /// The shards, out of as many as this is one of, that have any of `jobs`, as typed.
+    /// Returns the shards that have any of `jobs`, as typed. They belong to the same division as this shard.
     pub fn with_any(self, jobs: &[usize]) -> Vec<String> {
         let shards = (0..self.of).map(|index| Self { index, ..self });
         let concerned = shards.filter(|shard| jobs.iter().any(|job| shard.has(*job)));

@@ -1,4 +1,4 @@
-//! What is left when every job is done: a row for each point.
+//! The results of a finished sweep: a row for each point.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ pub const FILES: [&str; 4] = ["index.html", "sweep.csv", "sweep.svg", "sweep.png
 /// Scores of every point, with intervals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// What is varied.
+    /// The varied keys with their values.
     pub axes: Vec<Axis>,
     /// The scores, in the order of the columns.
     pub metrics: Vec<Metric>,
@@ -34,7 +34,7 @@ pub struct Row {
     pub pixels: u64,
     /// An estimate of each score.
     pub scores: Vec<Estimate>,
-    /// Where the last light was lost if no seed gave a single return.
+    /// The stage at which the last light was lost, if no seed gave a single return.
     pub empty: Option<String>,
 }
 
@@ -149,8 +149,8 @@ fn each_once<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 }
 
 impl Table {
-    /// As comma-separated text, with units in the header. Numbers have as many digits as it takes
-    /// to read the same number back; what is not known is an empty cell.
+    /// As comma-separated text, with units in the header. Numbers have the digits needed to read the same
+    /// number back. Unknown values are empty cells.
     pub fn csv(&self) -> String {
         let mut header: Vec<String> =
             self.axes.iter().map(|axis| quoted(&axis.key).into_owned()).collect();
@@ -177,7 +177,7 @@ impl Table {
         text
     }
 
-    /// What is to be said if there are points without a single return.
+    /// The warning if there are points without a single return.
     pub fn empty(&self) -> Option<String> {
         let reasons: Vec<&String> = self.rows.iter().filter_map(|row| row.empty.as_ref()).collect();
         let reason = reasons.first()?;

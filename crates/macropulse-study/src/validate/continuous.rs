@@ -96,7 +96,7 @@ fn intervals() -> Result<Vec<Figure>, Error> {
     Ok(all)
 }
 
-/// What a receiver of taps makes of the phase of light that it is given, rad.
+/// The phase that a receiver finds from the `electrons` of its taps, and its standard deviation, rad.
 fn received(method: &PhaseMethod, electrons: impl Fn(f64) -> f64) -> (f64, f64) {
     let phases = method.tones[0].phases;
     let taps = (0..phases).map(|tap| TAU * f64::from(tap) / f64::from(phases));

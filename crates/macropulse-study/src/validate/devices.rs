@@ -72,8 +72,8 @@ fn surfaces() -> Vec<Figure> {
     all
 }
 
-/// What ready sensors say of a wall of known reflectance that they see square on: the median of some
-/// thousand intensities.
+/// Intensities that ready sensors report of a wall of known reflectance that they see square on: the median
+/// of some thousand.
 fn intensities() -> Result<Vec<Figure>, Error> {
     let mut figures = Figures::of("intensity", "by definition");
     let walls = [

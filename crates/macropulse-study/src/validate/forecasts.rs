@@ -1,5 +1,5 @@
-//! Forecasts beside what is simulated: walls all around a ready sensor, of such a reflectance that one
-//! shot in ten, half of them, four in five, and nearly all are to be seen.
+//! Forecasts compared with simulations. Walls stand all around a ready sensor. Their reflectances are such
+//! that one shot in ten, half of them, four in five, and nearly all should be seen.
 
 use macropulse::codec::decode::Method;
 use macropulse::design::Design;
@@ -42,7 +42,7 @@ const ENVIRONMENT: &str = "night";
 /// The walls stand at this part of the range of the sensor.
 const PART: f64 = 0.7;
 
-/// So many places within a tick, at which walls stand, or one for each band where there are fewer.
+/// Number of places within a tick at which walls stand, or one for each band if there are fewer bands.
 const PHASES: usize = 4;
 
 /// Probabilities of detection at which a forecast is tried.
@@ -52,8 +52,8 @@ const WANTED: [f64; 4] = [0.1, 0.5, 0.8, 0.95];
 /// change with [`LIGHT_WITHIN`] is accepted, too.
 const PD_WITHIN: (f64, f64) = (0.02, 3.0);
 
-/// Share by which a forecast may take the light for more or less, a tenth of a decibel: if neighbours help
-/// each other, a little more light finds many more shots.
+/// Share by which the light of a forecast may be too high or too low: a tenth of a decibel. If neighbours
+/// help each other, a little more light finds many more shots.
 const LIGHT_WITHIN: f64 = 0.02;
 
 /// A precision may be off by such a share of what was found.
@@ -66,7 +66,7 @@ const ASIDE_WITHIN: (f64, f64) = (0.002, 3.0);
 /// million normal errors is that large.
 const BESIDE: f64 = 6.0;
 
-/// So many standard deviations to both sides have nearly all returns.
+/// Nearly all returns lie within this number of standard deviations to both sides.
 const WHOLE: f64 = 3.0;
 
 /// Standard deviations of fewer points are not compared: of 1000 they are known to 2 %.

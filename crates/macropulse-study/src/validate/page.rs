@@ -10,7 +10,7 @@ const LEAD: &str = "This page compares published figures with those of Macropuls
                     figure may differ by its rounding, by the tolerance of its source, or by three \
                     standard deviations if it was drawn.";
 
-/// What stands above the forecasts.
+/// The text above the forecasts.
 fn of_forecasts(findings: &Findings) -> String {
     format!(
         "A wall stands all around a ready sensor by night, square on, at 70 % of its range. Its \

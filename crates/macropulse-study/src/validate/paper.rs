@@ -1,4 +1,4 @@
-//! What follows from the numbers of the paper: most of it printed there, the rest computed apart.
+//! Figures that follow from the numbers of the paper: most are printed there, the rest are computed apart.
 
 use std::f64::consts::FRAC_PI_4;
 use std::path::Path;

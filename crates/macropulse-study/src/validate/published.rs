@@ -18,7 +18,7 @@ pub enum Within {
     Exactly,
     /// By this share of it: half a unit of its last digit, or what its source says.
     Share(f64),
-    /// By so much.
+    /// By this amount.
     Absolute(f64),
     /// By any amount, downwards: it is published as the most there is.
     AtMost,
@@ -29,9 +29,9 @@ pub enum Within {
 /// A published figure, and ours.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Figure {
-    /// What it belongs to.
+    /// Its topic.
     pub topic: &'static str,
-    /// What it is of, with its unit.
+    /// The quantity, with its unit.
     pub what: String,
     /// Its source, as docs/references.md names it.
     pub source: &'static str,
@@ -44,7 +44,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Whether ours is as published.
+    /// True if our figure agrees with the published one.
     pub fn holds(&self) -> bool {
         let off = (self.ours - self.published).abs();
         match self.within {
@@ -165,7 +165,7 @@ fn other_families() -> Result<Vec<Figure>, Error> {
     gold.add("different values", 3.0, values.len() as f64, Within::Exactly);
     all.extend(gold.done());
     let mut orthogonal = Figures::of("codes", "CSW89");
-    // As many words as can be: (n - 1)/(w(w - 1)).
+    // The largest possible number of words: (n - 1)/(w(w - 1)).
     let words = Family::orthogonal(13, 3, None)?.words();
     orthogonal.add(
         "words of an orthogonal code of 13 chips and 3 marks",

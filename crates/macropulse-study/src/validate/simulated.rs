@@ -26,8 +26,9 @@ pub(super) fn simulated() -> Result<Vec<Figure>, Error> {
     Ok(all)
 }
 
-/// Photons of a pulse; counts published without noise and with it; and three standard deviations of
-/// such a sum, from thirty drawn apart in NumPy, for the published ones are single runs.
+/// Photons of a pulse, counts published without noise and with it, and three standard deviations of each sum.
+/// The published counts are single runs. Their deviations come from thirty runs that were drawn apart in
+/// NumPy.
 const COUNTED: [(f64, [f64; 2], [f64; 2]); 6] = [
     (0.05, [2131.0, 4718.0], [123.0, 140.0]),
     (0.2, [5763.0, 7272.0], [123.0, 172.0]),
@@ -106,7 +107,7 @@ impl Counter {
         Ok(Self { design, step, log })
     }
 
-    /// What is counted in a run, the mean of several.
+    /// The counts of a run, as the mean of [`RUNS`] runs.
     fn counts(&self, photons: f64) -> Result<f64, Error> {
         // Soon after it is fired a pulse is back.
         let echo = |shot| Echo { shot, delay_fs: 1_000_000, photons };
@@ -147,10 +148,10 @@ fn turning_heads() -> Result<Vec<Figure>, Error> {
     Ok(figures.done())
 }
 
-/// The share of the shots that `ours` fires in 3.33 s at which the beam of `other`, east of it and with a
-/// `clock` of its own, crosses the half-line that our beam is on.
+/// Share of the shots of `ours` in 3.33 s at which the beam of `other` crosses the half-line that our beam is
+/// on. `other` stands east of `ours` and has a `clock` of its own.
 fn crossed(ours: &Design, other: &Design, clock: Clock) -> f64 {
-    // In which 10 Hz gain a turn on 9.7.
+    // In this time 10 Hz gain a turn on 9.7 Hz.
     const SPAN_FS: i64 = 3_333_333_333_333_333;
     let azimuths = |design: &Design, clock: Clock| {
         let mut list: Vec<(i64, f64)> = Vec::new();

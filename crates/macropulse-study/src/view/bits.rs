@@ -6,7 +6,7 @@ use super::ticks::{label, linear_ticks};
 /// The bits of a payload and the chips of its code word \[KP16 Fig. 4\].
 #[derive(Debug, Clone, PartialEq)]
 pub struct BitPicture<'a> {
-    /// What it shows, in words for those who cannot see it.
+    /// Description in words for those who cannot see the picture.
     pub title: String,
     /// Bits in the order in which they are sent, label first.
     pub bits: &'a [bool],

@@ -7,7 +7,7 @@ use resvg::tiny_skia::Pixmap;
 
 const LONGEST_SIDE: usize = 16_384;
 
-/// A picture in the making. What falls outside is cut off.
+/// A picture in the making. Everything outside it is cut off.
 #[derive(Debug, Clone)]
 pub(super) struct Canvas {
     pub width: usize,

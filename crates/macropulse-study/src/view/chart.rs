@@ -112,20 +112,20 @@ pub enum Line {
 pub struct Note {
     /// x and y.
     pub at: [f64; 2],
-    /// What it says.
+    /// Its text.
     pub text: String,
 }
 
 /// A chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// What the chart shows, in words for those who cannot see it.
+    /// Description in words for those who cannot see the chart.
     pub title: String,
     /// Horizontal axis.
     pub x: Axis,
     /// Vertical axis.
     pub y: Axis,
-    /// What is shown; later ones cover earlier ones.
+    /// The data; later series cover earlier ones.
     pub series: Vec<Series>,
     /// Shaded areas behind everything.
     pub bands: Vec<Band>,

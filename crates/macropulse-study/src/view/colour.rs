@@ -1,4 +1,4 @@
-//! What a colour means.
+//! Colours and their meanings.
 
 use macropulse::points::Outcome;
 

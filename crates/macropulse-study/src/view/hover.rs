@@ -1,4 +1,4 @@
-//! What a chart tells the script that shows its values at the pointer.
+//! Data of a chart for the script that shows its values at the pointer.
 
 use serde_json::{Value, json};
 

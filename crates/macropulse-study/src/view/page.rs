@@ -51,7 +51,7 @@ impl Figure {
     }
 }
 
-/// What a remark wants from the reader.
+/// Tone of a remark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tone {
     /// Good to know.

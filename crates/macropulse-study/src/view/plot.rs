@@ -73,7 +73,7 @@ impl Ruler {
         }
     }
 
-    /// Where `value` lies; nothing if it has no place on this scale.
+    /// The place of `value`; `None` if it has none on this scale.
     pub fn place(&self, value: f64) -> Option<f64> {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
@@ -83,7 +83,7 @@ impl Ruler {
         share.is_finite().then(|| self.ends[0] + share * (self.ends[1] - self.ends[0]))
     }
 
-    /// Where bars stand: 0, or the end of the axis next to it.
+    /// The place at which bars begin: 0, or the end of the axis next to it.
     pub fn base(&self) -> f64 {
         let zero =
             if self.scale == Scale::Linear { 0.0_f64.clamp(self.low, self.high) } else { self.low };

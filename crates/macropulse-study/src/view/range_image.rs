@@ -19,7 +19,7 @@ const STROKE: usize = 2;
 const NARROWEST: usize = 440;
 const BAR_HEIGHT: usize = 10;
 
-/// A part of the pixel grid. What lies outside the grid is left out.
+/// A part of the pixel grid. Anything outside the grid is left out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Crop {
     /// Rows, from the top.
@@ -31,7 +31,7 @@ pub struct Crop {
 /// A length drawn below the picture, so that sizes can be read off.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScaleBar {
-    /// What it says, for instance "1 m at 30 m".
+    /// Its text, for instance "1 m at 30 m".
     pub label: String,
     /// Its length in columns of the grid.
     pub columns: f64,
@@ -179,7 +179,7 @@ impl OutcomePicture<'_> {
     }
 }
 
-/// What explains the colours.
+/// Explanation of the colours.
 pub(super) enum Key {
     Bar { colour: fn(f64) -> Rgb, ends: [f32; 2], unit: &'static str },
     Legend(Vec<(Rgb, String)>),

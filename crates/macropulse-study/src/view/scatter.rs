@@ -7,7 +7,7 @@ use super::colour::{NIGHT, mix, place, range_colour};
 /// Larger dots would hide the cloud.
 const LARGEST_DOT: usize = 64;
 
-/// Where a picture is taken from. Metres, in the frame of the cloud, z up.
+/// Position and direction from which a picture is taken. Metres, in the frame of the cloud, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Viewpoint {
     /// Place of the eye.
@@ -27,7 +27,7 @@ pub struct CloudPicture<'a> {
     pub range: &'a [f32],
     /// Ranges at the ends of the colours, m.
     pub ends: [f32; 2],
-    /// Where the picture is taken from.
+    /// Position and direction from which the picture is taken.
     pub viewpoint: Viewpoint,
     /// Width and height of the picture in pixels.
     pub size: [usize; 2],
@@ -109,7 +109,7 @@ impl Camera {
         Self { eye, forward, right, up: right.cross(forward), size, focal: size[0] / 2.0 / half }
     }
 
-    /// Where a point is in the picture, or nothing if it is behind the eye or outside.
+    /// The place of a point in the picture; `None` if it is behind the eye or outside.
     fn project(&self, point: [f64; 3]) -> Option<Dot> {
         let offset = glam::DVec3::from(point) - self.eye;
         let depth = offset.dot(self.forward);

@@ -13,7 +13,7 @@ const HEAD: f64 = 34.0;
 /// Charts one below the other, as a picture of their own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stack {
-    /// What it shows, above the first chart.
+    /// Title above the first chart.
     pub title: String,
     /// From the top down.
     pub charts: Vec<Chart>,

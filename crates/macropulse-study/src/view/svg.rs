@@ -2,16 +2,16 @@
 
 use super::theme;
 
-/// Colours of series and bars. What each looks like depends on the reader's light or dark page.
+/// Colours of series and bars. Their shades depend on the reader's light or dark page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Hue {
     /// First choice.
     Blue,
     /// Stands out against blue for every kind of eye.
     Orange,
-    /// What holds.
+    /// For a result that holds.
     Green,
-    /// What fails.
+    /// For a result that fails.
     Red,
     /// A fifth series.
     Purple,
@@ -39,7 +39,7 @@ impl Hue {
     }
 }
 
-/// What a chart is drawn on.
+/// Background of a chart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ground {
     /// A light page.
@@ -63,8 +63,8 @@ const COLOURS: [(&str, &str, &str); 11] = [
     ("grey", "#727b8b", "#98a1b2"),
 ];
 
-/// What the classes look like. The hue of an element is its text colour, which its strokes and
-/// fills refer to: that, unlike a property of our own, is understood wherever SVG is drawn.
+/// Style of the classes. The hue of an element is its text colour, which its strokes and fills refer to.
+/// Unlike a property of our own, that is understood wherever SVG is drawn.
 const RULES: &str = "\
 svg.mp{font:12px/1.2 ui-sans-serif,system-ui,-apple-system,'Segoe UI',Roboto,Helvetica,Arial,sans-serif;\
 font-variant-numeric:tabular-nums}\
@@ -187,7 +187,7 @@ impl Svg {
         self.push(&format!("<metadata>{}</metadata>", escape(&json.to_string())));
     }
 
-    /// What is drawn until [`Svg::close_window`] is cut off at this rectangle.
+    /// Opens a window: drawing outside this rectangle is cut off until [`Svg::close_window`].
     pub fn open_window(&mut self, corner: [f64; 2], size: [f64; 2]) {
         let [x, y, width, height] = [corner[0], corner[1], size[0], size[1]].map(number);
         // A nested drawing needs no identifier, which would have to be unique in the page.
@@ -274,7 +274,7 @@ fn letter_width(letter: char) -> f64 {
     }
 }
 
-/// Whether every tag that opens also closes, in order; what the tests of all drawings ask.
+/// True if every tag that opens also closes, in order. The tests of all drawings call it.
 #[cfg(test)]
 pub(super) fn is_balanced(markup: &str) -> bool {
     let mut open = Vec::new();

@@ -14,7 +14,7 @@ pub enum Align {
     Right,
 }
 
-/// What a cell says about a claim.
+/// Verdict of a cell on a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// The claim is true.
@@ -50,7 +50,7 @@ impl<T: AsRef<str>> From<T> for Cell {
 /// A table with a header.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Table {
-    /// What it shows; may be empty.
+    /// Its caption; may be empty.
     pub caption: String,
     /// Titles of the columns and how these stand.
     pub header: Vec<(String, Align)>,

@@ -1,4 +1,4 @@
-//! What all pages share: light and dark, values of charts at the pointer, links to files.
+//! Parts that all pages share: light and dark, values of charts at the pointer, links to files.
 //!
 //! A page is as light or dark as the reader's system; a button on it overrules that.
 

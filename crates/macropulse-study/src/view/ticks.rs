@@ -1,4 +1,4 @@
-//! Where an axis has its ticks, and what they say.
+//! Ticks of an axis and their labels.
 
 /// No axis has more ticks than this, whatever rounding does to its ends.
 const MOST: usize = 200;

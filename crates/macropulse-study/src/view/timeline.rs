@@ -23,7 +23,7 @@ pub struct Span {
 pub struct Lane {
     /// Name at the left.
     pub label: String,
-    /// What happens in it.
+    /// Its stretches of time.
     pub spans: Vec<Span>,
 }
 
@@ -41,7 +41,7 @@ pub struct Flight {
 /// Lanes over time \[KP16 Fig. 2\].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timeline {
-    /// What it shows, in words for those who cannot see it.
+    /// Description in words for those who cannot see the picture.
     pub title: String,
     /// Rows from the top.
     pub lanes: Vec<Lane>,

@@ -1,8 +1,8 @@
 //! The drawing of the car: a mid-size saloon, 4.70 m long, 1.82 m wide, 1.42 m high.
 //!
-//! The body is a loft: half a cross-section at each of some sixty stations along the car,
-//! mirrored. Lengths along the car are measured from the front backwards (`s`) while it is
-//! drawn; the finished mesh stands on z = 0, centred in x and y, and **looks along +x**.
+//! The body is a loft: half a cross-section at each of some sixty stations along the car, mirrored. While it
+//! is drawn, lengths along the car are measured from the front backwards (`s`). The finished mesh stands on
+//! the plane z = 0, centred in x and y, and **looks along +x**.
 
 use std::error::Error;
 
@@ -12,11 +12,11 @@ use super::parts::{self, Sheet};
 /// Length, width and height of the car, m. The mesh has exactly this bounding box.
 pub const SIZE: [f64; 3] = [4.70, 1.82, 1.42];
 
-/// What the body is made of.
+/// Material of the body.
 pub const PAINT: &str = "paint-white";
-/// What its windows are made of.
+/// Material of its windows.
 pub const GLASS: &str = "glass";
-/// What its dark parts are made of.
+/// Material of its dark parts.
 pub const TRIM: &str = "plastic-black";
 
 /// Distance of the axles from the front, m.
@@ -130,7 +130,8 @@ fn fit(mesh: &mut Mesh) {
     }
 }
 
-/// Where the body has a cross-section: evenly, and finer around the arches and at the ends.
+/// Returns the stations at which the body has a cross-section: evenly spaced, and closer around the arches
+/// and at the ends.
 fn stations() -> Vec<f64> {
     let mut at: Vec<f64> = (0..=47).map(|step| f64::from(step) * 0.1).collect();
     at.extend([0.015, 0.03, 0.05, 0.08, 0.12, 0.16, 4.55, 4.62, 4.65, 4.67, 4.685]);

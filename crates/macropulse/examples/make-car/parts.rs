@@ -18,7 +18,7 @@ const PLATE: &str = "number-plate";
 
 /// A grid of points: lines of equal length.
 pub struct Sheet<'a> {
-    /// The lines, each of as many points.
+    /// The lines, all with the same number of points.
     pub points: &'a [Vec<[f64; 3]>],
 }
 
@@ -124,7 +124,7 @@ pub fn cabin(mesh: &mut Mesh) {
     }
     block(mesh, [3.05, -0.62, 0.42], [3.45, 0.62, 0.58], SEAT);
     block(mesh, [3.42, -0.62, 0.45], [3.56, 0.62, 1.02], SEAT);
-    // What closes the arches towards the middle.
+    // Blocks that close the arches towards the middle.
     for axle in AXLES {
         block(mesh, [axle - 0.45, -0.62, 0.20], [axle + 0.45, 0.62, 0.73], TRIM);
     }

@@ -1,8 +1,8 @@
 //! Pulse trains of interferers at the aperture (docs/physics.md#other-lidars).
 //!
-//! 1. The receiver listens from the firing of each shot to the end of its range gate. In that time
-//!    light arrives that interferers have fired as long before as light is followed, there and
-//!    back. A detector of its own pixel listens to its own shot alone.
+//! 1. The receiver listens from the firing of each shot to the end of its range gate. In that time light
+//!    arrives from shots that interferers fired earlier, by at most the time in which light is followed,
+//!    there and back. A detector of its own pixel listens to its own shot alone.
 //! 2. By reflection: from each point that a ray of an interferer meets and a listening detector
 //!    looks at ([`Illuminated`]), with the photons
 //!
@@ -14,9 +14,9 @@
 //!
 //!    n = K · exp(−r²/s²) · exp(−σ·D) / s², s² = a² + b²/2
 //!
-//!    b = d/2 + D·θ/2 for a beam of diameter d and divergence θ that begins D metres away. The edge of the
-//!    aperture is taken to be Gaussian, so that the formula holds for a beam that is narrower than
-//!    the aperture as for one that is wider. a is that of the sensor's link budget ([`aperture_radius`]).
+//!    b = d/2 + D·θ/2 for a beam of diameter d and divergence θ that begins D metres away. The radius a is
+//!    that of the sensor's link budget, if it has one ([`aperture_radius`]). The edge of the aperture is
+//!    taken to be Gaussian, so the formula holds for beams both narrower and wider than the aperture.
 //!
 //! All of it is where it is when the shot is fired.
 
@@ -36,10 +36,10 @@ pub const APERTURE_RADIUS: f64 = 12.5e-3;
 /// Light that brings fewer photons per mark is left out.
 const FAINTEST: f64 = 1e-6;
 
-/// Beams that pass the aperture by more than so many times s are left out.
+/// Beams whose axis passes the aperture at more than this multiple of s are left out.
 const FARTHEST_BY: f64 = 4.0;
 
-/// A micropulse ends so many times its length before and after its middle.
+/// A micropulse ends this multiple of its length before and after its middle.
 const FLANKS: f64 = 4.0;
 
 /// Number of the direct way; those before it are the rays of a footprint.
@@ -209,9 +209,9 @@ struct Direct<'a> {
     pair: Pair<'a>,
     aperture: f64,
     farthest: f64,
-    /// Where both are.
+    /// Poses of both lidars.
     ends: Ends,
-    /// Where the beam begins, in the frame of the other, m.
+    /// Start of the beam, in the frame of the other, m.
     begin: [f64; 3],
     /// The way from there; `None` if it is too long.
     sight: Option<Sight>,
@@ -332,7 +332,7 @@ impl Arrivals<'_> {
         }
     }
 
-    /// Adds what arrives of a shot after a way of so many metres.
+    /// Adds the light of a shot that arrives after a way of `way` metres.
     fn add(
         &mut self,
         (log, shot): (&ShotLog, usize),

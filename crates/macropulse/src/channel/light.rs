@@ -1,18 +1,18 @@
-//! Light that reaches the detectors of a sensor while it measures a band: what every source adds to and every
-//! detector sees.
+//! Light that reaches the detectors of a sensor while it measures a band. Every source adds to it, and every
+//! detector sees it.
 //!
-//! Light is pulse trains, background and responses. A **pulse train** is what one shot of one lidar brings
-//! along one way: the marks of a macropulse, or of a sub-macropulse, from a surface or straight
-//! from an interferer. The **background** is a rate λ(t): light without pulses, as sunlight. A **response** is
-//! such a rate after each mark that the sensor sends. A detector is a function of all and is not told whose light
-//! it is.
+//! Light is pulse trains, background and responses. A **pulse train** is the light of one shot of one lidar
+//! along one way: the marks of a macropulse, or of a sub-macropulse. It comes from a surface or straight from
+//! an interferer. The **background** is a rate λ(t): light without pulses, such as sunlight. A **response**
+//! is such a rate after each mark that the sensor sends. A detector is a function of all three and does not
+//! know whose light it is.
 
 use macropulse_codec::code::Codebook;
 
 use super::Response;
 use crate::design::Design;
 
-/// What a lidar sends: how the marks of its pulse trains follow each other.
+/// A source of pulse trains: how the marks that a lidar sends follow each other.
 #[derive(Debug, Clone, Copy)]
 pub struct Transmitter<'a> {
     /// The marks of its macropulses.
@@ -42,9 +42,9 @@ pub struct Light<'a> {
     pub transmitters: Vec<Transmitter<'a>>,
     /// The pulse trains of all of them, in no particular order.
     pub trains: PulseTrains,
-    /// What shines without pulses.
+    /// Light without pulses.
     pub background: Background,
-    /// What each mark of the sensor itself brings without pulses.
+    /// Light without pulses that each mark of the sensor itself brings.
     pub responses: Vec<Response>,
 }
 
@@ -100,7 +100,7 @@ impl PulseTrains {
         self.arrives_fs.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there is none.
     pub fn is_empty(&self) -> bool {
         self.arrives_fs.is_empty()
     }
@@ -118,8 +118,8 @@ impl PulseTrains {
         self.way.push(train.way);
     }
 
-    /// The counter of the random numbers of pulse train `index`: the way in the highest bits, then
-    /// the transmitter, and the shot, of which 2⁴⁰ are told apart.
+    /// Returns the counter of the random numbers of pulse train `index`. It holds the way in the highest
+    /// bits, then the transmitter, and the shot, modulo 2⁴⁰.
     pub fn address(&self, index: usize) -> u64 {
         let (way, transmitter) = (u64::from(self.way[index]), u64::from(self.transmitter[index]));
         way << 48 | transmitter << 40 | self.shot[index] & ((1 << 40) - 1)
@@ -161,8 +161,8 @@ impl Light<'_> {
 
 /// Light without pulses: a rate λ(t) for each channel.
 ///
-/// In every channel and at any time there is `steady`; beside it, what the other columns say, one
-/// entry for a stretch of time in one channel. Stretches may overlap: their rates add up.
+/// `steady` holds in every channel at any time. The other columns add to it, one entry for a stretch of time
+/// in one channel. Stretches may overlap: their rates add up.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Background {
     /// Photons per second in each channel, all the time.

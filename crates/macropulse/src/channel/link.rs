@@ -42,11 +42,11 @@ impl Link {
     /// The link from the lidar `other` into the receiver of `ours`; `None` where the filter of the
     /// receiver stops the light: ±[`FILTER`] about its own wavelength, unless it is known.
     ///
-    /// The photons of a mark of the interferer follow from the sensitivity that it declares of
-    /// itself, n₀·R₀²/ρ₀ at one metre from white: its energy in an aperture, optics and detector
-    /// like its own, which ours are taken to be unless both have a link budget. A detector of ours
-    /// that never misses sees every mark; of another that never misses, by which its energy is left
-    /// open, ours is assumed.
+    /// The photons of a mark of the interferer follow from the sensitivity that it declares of itself,
+    /// n₀·R₀²/ρ₀ at one metre from white. This is its energy in an aperture, optics and detector like its
+    /// own. Ours are taken to be like these unless both have a link budget. If our detector never misses, it
+    /// sees every mark. If only that of the interferer never misses, its energy is left open, and ours is
+    /// assumed.
     pub fn of_interferer(ours: &Design, other: &Design, environment: &Environment) -> Option<Self> {
         let filter = ours.budget.as_ref().map_or(FILTER, |budget| budget.filter / 2.0);
         if (ours.light.wavelength - other.light.wavelength).abs() > filter {
@@ -107,8 +107,8 @@ impl Link {
     }
 }
 
-/// What a `transmission` leaves of `light`: all of it where there is no end of light, as at a detector that
-/// never misses.
+/// Returns the part of `light` that a `transmission` leaves. Infinite light, as at a detector that never
+/// misses, stays infinite.
 #[inline]
 fn dimmed(light: f64, transmission: f64) -> f64 {
     if light.is_infinite() { light } else { light * transmission }

@@ -1,4 +1,4 @@
-//! What reaches the aperture: surfaces and interferers become light.
+//! Light that reaches the aperture, from surfaces and interferers.
 //!
 //! For an extended Lambertian target that the beam does not overfill, the energy received is
 //!
@@ -9,11 +9,10 @@
 //!
 //! n = n₀ · (ρ_eff / ρ₀) · (R₀ / R)² · T² · w
 //!
-//! are detected, and n over the efficiency of its detector reach it. Here ρ_eff is the backscatter of the material
-//! towards the sensor, and w the share of the beam that meets it. A sensor
-//! with a link budget has n₀ from it, for a white target at its rated range. Where its field of view
-//! is scanned with the beam, the share of the spot that is still in the field when the echo arrives
-//! is a factor too.
+//! are detected, and n over the efficiency of its detector reach it. Here ρ_eff is the backscatter of the
+//! material towards the sensor, and w the share of the beam that meets it. A sensor with a link budget has n₀
+//! from it, for a white target at its rated range. If its field of view is scanned with the beam, the share
+//! of the spot that is still in the field when the echo arrives is a factor, too.
 
 mod interferers;
 mod light;
@@ -43,7 +42,7 @@ pub struct Seen<'a> {
     pub design: &'a Design,
     /// The scene that it looks at.
     pub scene: &'a Scene,
-    /// What follows from the sensor and the environment of the scene.
+    /// Conditions that follow from the sensor and the environment of the scene.
     pub operating: &'a Operating,
     /// The random numbers of the run.
     pub chance: Chance,
@@ -92,8 +91,8 @@ fn start_late(trains: &mut PulseTrains, design: &Design, log: &ShotLog) {
     }
 }
 
-/// How bright each of `hits` is with speckle, in its mean: by its shot and its place among those of the shot,
-/// so that the marks of a macropulse that is met in parts share it.
+/// Returns the brightness of each of `hits` with speckle, relative to its mean. It depends on the shot and on
+/// the place of the hit among those of the shot, so the marks of a macropulse that is met in parts share it.
 fn factors<'a>(
     (speckle, chance): &'a (Speckle, Chance),
     log: &'a ShotLog,
@@ -109,8 +108,8 @@ fn factors<'a>(
     })
 }
 
-/// Adds the echoes of `hits`: whole macropulses, ordered by shot; what has no light is left out. They are
-/// as bright as they are on average, but for what speckle makes of them.
+/// Adds the echoes of `hits`: whole macropulses, ordered by shot. Hits without light are left out. An echo
+/// has its mean brightness, times its speckle.
 pub fn echoes(
     trains: &mut PulseTrains,
     (link, finishes): (&Link, &[Finish]),
@@ -143,7 +142,7 @@ pub fn echoes(
     add_columns(trains, log, &shots, &delay_fs);
 }
 
-/// Adds all columns but the photons of the echoes of `shots`, so long after each was fired.
+/// Adds all columns but the photons of the echoes of `shots`, each `delay_fs` after it was fired.
 fn add_columns(trains: &mut PulseTrains, log: &ShotLog, shots: &[u32], delay_fs: &[i64]) {
     // Column by column: rows would take three times as long.
     let all = trains.photons.len();
@@ -219,8 +218,8 @@ pub struct Echo {
 /// The light of `echoes` of the shots of `log`, ordered by shot: for studies of detectors and
 /// receivers without a scene.
 ///
-/// Echoes of one shot are drawn independently of each other, up to 65 536 of them, and 5041 where
-/// micropulses are followed in slices; those beyond may repeat what was drawn for the first.
+/// Echoes of one shot are drawn independently of each other, up to 65 536 of them, or 5041 if micropulses are
+/// followed in slices. Echoes beyond may repeat the random numbers of the first.
 pub fn light_of_echoes<'a>(
     design: &'a Design,
     log: &ShotLog,
@@ -250,7 +249,7 @@ const WHOLE: PulseTrain = PulseTrain {
     way: 0,
 };
 
-/// `train` as the echo of a shot of the log, so long after it was fired.
+/// Returns `train` as the echo of a shot of the log, `delay_fs` after it was fired.
 #[inline]
 fn echo(log: &ShotLog, shot: usize, delay_fs: i64, train: PulseTrain) -> PulseTrain {
     PulseTrain {

@@ -34,7 +34,7 @@ pub struct Operating {
 pub struct Idealised {
     /// Its name, as in a list `idealised`.
     pub name: &'static str,
-    /// What is assumed instead.
+    /// The assumption that replaces it.
     pub assumption: &'static str,
 }
 
@@ -71,8 +71,8 @@ impl Operating {
     /// The sensor `design` in `environment`.
     ///
     /// # Errors
-    /// If the table of sunlight does not go to the wavelength of a sensor with a link budget, or its
-    /// detector cannot be followed in so much light.
+    /// If the table of sunlight does not go to the wavelength of a sensor with a link budget, or its detector
+    /// cannot be simulated in this sunlight.
     pub fn of(design: &Design, environment: &Environment) -> Result<Self, Error> {
         let refuse = |message: String| Error {
             sensor: design.name.clone(),
@@ -166,7 +166,7 @@ mod tests {
         let ratio = by_night.threshold / by_night.rms;
         assert_relative_eq!(by_day.threshold / by_day.rms, ratio, max_relative = 1e-12);
         let faint = Lit { photons: 0.0, background: day.background, falling: 0.0 };
-        // What crosses the threshold without light just does.
+        // A crossing without light only just exceeds the threshold.
         assert_relative_eq!(model.mark_jitter(&faint), model.jitter(), max_relative = 0.05);
     }
 

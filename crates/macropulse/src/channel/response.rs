@@ -7,7 +7,7 @@ use macropulse_codec::ShotLog;
 use super::{Background, Light};
 use crate::units::s_from_fs;
 
-/// What each mark of the sensor itself brings without pulses, in the channel of its shot.
+/// Light without pulses that each mark of the sensor itself brings, in the channel of its shot.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Response {
     /// Length of a step of time, fs: more than 0.
@@ -17,9 +17,9 @@ pub struct Response {
 }
 
 impl<'a> Light<'a> {
-    /// This light with its responses to the shots of `log` as stretches of background: in steps that are counted
-    /// from the beginning of the first scan, so that they are the same in every band, and a mark is sent at the
-    /// beginning of its step.
+    /// Returns this light, with its responses to the shots of `log` as stretches of background. Steps are
+    /// counted from the beginning of the first scan, so they are the same in every band. A mark counts as
+    /// sent at the beginning of its step.
     pub(crate) fn with_responses(&self, log: &ShotLog) -> Cow<'_, Self> {
         let mut light = Cow::Borrowed(self);
         for response in self.responses.iter().filter(|response| response.step_fs > 0) {
@@ -31,8 +31,8 @@ impl<'a> Light<'a> {
         light
     }
 
-    /// The steps in which marks of the shots of `log` are sent that `channel` listens to, ascending, and how many
-    /// in each.
+    /// Returns the steps in which marks of the shots of `channel` in `log` are sent, ascending, with the
+    /// number of marks in each.
     fn marks_in_steps(&self, log: &ShotLog, channel: u16, step_fs: i64) -> Vec<(i64, usize)> {
         let transmitter = &self.transmitters[0];
         let shots = (0..log.len()).filter(|shot| log.channel.get(*shot) == Some(&channel));
@@ -51,7 +51,7 @@ impl<'a> Light<'a> {
 }
 
 impl Response {
-    /// Adds what `channel` gets of `marks`, by the steps in which they are sent, to the `background`.
+    /// Adds the response to `marks`, by the steps in which they are sent, to the `background` of `channel`.
     fn add_to(&self, background: &mut Background, channel: u16, marks: &[(i64, usize)]) {
         let length = self.photons.len();
         for run in marks.chunk_by(|(one, _), (next, _)| next - one <= length as i64) {
@@ -73,7 +73,8 @@ impl Response {
     }
 
     /// Adds the mean photons in each bin of `bin_fs` of a cycle of `interval_fs` whose pulse is sent at its
-    /// beginning, and those before it as well: what comes later falls into the cycles that follow.
+    /// beginning. Light of earlier pulses counts as well: a response that is longer than a cycle falls into
+    /// the cycles that follow.
     pub(crate) fn add_to_cycle(&self, bins: &mut [f64], (bin_fs, interval_fs): (i64, i64)) {
         for (step, photons) in (0..).zip(&self.photons) {
             // A step is divided among the bins in which it lies.

@@ -1,30 +1,31 @@
-//! Speckle: what a rough surface sends back of coherent light varies from place to place.
+//! Speckle: the coherent light that a rough surface sends back varies from place to place.
 //!
 //! The fields of the many points of a spot add up with unknown phases. Behind an aperture that holds M
 //! independent cells of that pattern the energy of an echo is gamma distributed about its mean, with the
 //! variance mean²/M. M⁻¹ is the mean, over pairs of points of the aperture, of |μ|², the squared coherence of
-//! the light there \[Good07\]. Of a Gaussian spot of radius w at 1/e², R away, |μ|² = exp(−(π·w·Δ/(λ·R))²)
-//! for points Δ apart, and behind a circular aperture of diameter D, with q = (π·w·D/(λ·R))²,
+//! the light there \[Good07\]. For a Gaussian spot of radius w at 1/e², R away, |μ|² = exp(−(π·w·Δ/(λ·R))²)
+//! for points Δ apart. Behind a circular aperture of diameter D, with q = (π·w·D/(λ·R))²,
 //!
 //! M₀ = q / (4·\[1 − exp(−q/2)·(I₀(q/2) + I₁(q/2))\]),
 //!
-//! 1 of a small aperture, and q/4 = π·w²·A/(λ·R)² of a large one of area A.
+//! 1 for a small aperture, and q/4 = π·w²·A/(λ·R)² for a large one of area A.
 //!
-//! On a surface tilted by i points of the spot lie at different depths, and light of the spectral width
-//! Δν adds up with fields of fewer of them. Of pairs of points that far apart in depth a share of
-//! exp(−4·σ_k²·Δz²) is left, σ_k = 2π·Δν/(2.355·c), and M is larger by
+//! On a surface tilted by i, points of the spot lie at different depths, and light of the spectral width Δν
+//! adds up with fields of fewer of them. For pairs of points Δz apart in depth a share of exp(−4·σ_k²·Δz²) is
+//! left, with σ_k = 2π·Δν/(2.355·c), and M is larger by
 //!
 //! √(1 + 4·(w·σ_k·tan i)²/(1 + q/4)),
 //!
-//! with a Gaussian in place of the Airy disc along the tilt: some 8 % more than the fields of random points add
-//! up to, tilted by 45° and 60°. Δν is the line width of the laser with that
-//! which a pulse of length τ has at least, 0.441/τ.
+//! with a Gaussian in place of the Airy disc along the tilt. This is some 8 % more than the fields of random
+//! points add up to, tilted by 45° and 60°. Δν is the line width of the laser combined with the least width
+//! of a pulse of length τ, 0.441/τ.
 //!
-//! All marks of a shot share their cells: they come within a fraction of a microsecond, in which a laser keeps
-//! its frequency to much less than the width that would tell depths apart, and the beam moves by less than
-//! itself. Different shots, and scans, have cells of their own. Of a beam in several rays each has its
-//! share of the cells; their sum has the same distribution, however many there are. Every surface is
-//! taken for rough, mirrors and retroreflectors, too; glass before it takes cells with the light.
+//! All marks of a shot share their cells, because they come within a fraction of a microsecond. In that time
+//! a laser keeps its frequency to much less than the width that would tell depths apart, and the beam moves
+//! by less than itself. Different shots, and scans, have cells of their own. If a beam is traced in several
+//! rays, each ray has its share of the cells. Their sum has the same distribution for any number of rays.
+//! Every surface counts as rough, even mirrors and retroreflectors. Glass in front of it takes away cells
+//! along with the light.
 
 use std::f64::consts::PI;
 
@@ -49,8 +50,9 @@ pub struct Speckle {
 }
 
 impl Speckle {
-    /// That of a sensor whose aperture and beam are known, whether it is simulated or not: of a laser
-    /// whose line width is not said, that of its pulses. A coherent receiver sees one cell, which it follows itself.
+    /// Returns the speckle of a sensor whose aperture and beam are known, even if it is not simulated. A
+    /// laser without a stated line width has that of its pulses. A coherent receiver sees one cell, which it
+    /// follows itself.
     pub fn of(design: &Design) -> Option<Self> {
         let is_seen = design.light.divergence > 0.0 && design.emission.chirp().is_none();
         let budget = design.budget.as_ref().filter(|_| is_seen)?;
@@ -69,13 +71,13 @@ impl Speckle {
         })
     }
 
-    /// That of a sensor whose file asks for it by the line width of its laser.
+    /// Returns the speckle of a sensor whose file asks for it by the line width of its laser.
     pub fn simulated(design: &Design) -> Option<Self> {
         design.light.linewidth.and_then(|_| Self::of(design))
     }
 
-    /// Cells, M, that the aperture holds of an echo from `range` metres, off a surface at which the light comes
-    /// in with so much `cosine` of its angle.
+    /// Returns the number of cells, M, that the aperture holds of an echo from `range` metres, off a surface
+    /// that the light meets at an angle with this `cosine`.
     pub fn cells(&self, range: f64, cosine: f64) -> f64 {
         let radius = libm::hypot(self.beam_diameter, self.divergence * range) / 2.0;
         let root = PI * radius * self.aperture / (self.wavelength * range.max(f64::MIN_POSITIVE));
@@ -85,7 +87,8 @@ impl Speckle {
         spatial(q) * (1.0 + depth * depth / (1.0 + q / 4.0)).sqrt()
     }
 
-    /// How many times its mean the echo of ray `ray` of shot `shot` brings, which has the `share` of the beam.
+    /// Draws the energy of the echo of ray `ray` of shot `shot`, relative to its mean. The ray has this
+    /// `share` of the beam.
     pub(super) fn factor(
         &self,
         chance: &Chance,
@@ -107,8 +110,8 @@ fn spatial(q: f64) -> f64 {
     q / (4.0 * (1.0 - sum_of_bessels(q / 2.0)))
 }
 
-/// exp(−x)·(I₀(x) + I₁(x)): by their integral ∫ exp(x·(cos θ − 1))·(1 + cos θ) dθ/π from 0 to π, of which 64
-/// steps leave less than 10⁻¹² up to x = 50, and by the first terms of their series in 1/x beyond.
+/// Returns exp(−x)·(I₀(x) + I₁(x)). Up to x = 50 it is the integral ∫ exp(x·(cos θ − 1))·(1 + cos θ) dθ/π
+/// from 0 to π, which 64 steps give to within 10⁻¹². Beyond, it is the first terms of the series in 1/x.
 fn sum_of_bessels(x: f64) -> f64 {
     if x > 50.0 {
         let series = 2.0 - (1.0 / 4.0 + (6.0 / 128.0 + 90.0 / 3072.0 / x) / x) / x;
@@ -171,7 +174,7 @@ mod tests {
     }
 
     /// H0: mean 1 and variance 1/M, of an echo in one ray and of one in seven. N = 40 000, seed 3; bounds are
-    /// five standard errors. Control: half as many cells vary twice as much.
+    /// five standard errors. Control: half the number of cells has twice the variance.
     #[test]
     fn rays_add_up_to_one_echo() {
         let it = of(&[("light.linewidth_ghz", "0"), ("optics.aperture_mm", "6")]);

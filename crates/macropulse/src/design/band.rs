@@ -1,7 +1,7 @@
-//! How long a stretch of time may be that is computed in one go.
+//! The longest stretch of time that is computed in one go.
 //!
-//! Detection events are timed in 32 bits, in parts of a tick. What a band sees must lie within: its shots,
-//! its guard shots, and their echoes.
+//! Detection events are timed in 32 bits, in parts of a tick. The shots of a band, its guard shots, and their
+//! echoes must fit in.
 
 use super::Design;
 use macropulse_codec::{Cut, RecordKind};
@@ -11,7 +11,7 @@ use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 /// Parts of a tick in which detection events are timed. Jitter is rounded to one, by 6 µm for 2.5 ps.
 pub const PARTS_OF_TICK: u32 = 64;
 
-/// Jitter beyond so many standard deviations does not happen: once in 10¹⁸ events.
+/// Jitter beyond this number of standard deviations does not happen: once in 10¹⁸ events.
 pub const MOST_SIGMA: f64 = 9.0;
 
 /// Said where 2²⁶ ticks do not hold the echoes of one shot and of those in flight with it.
@@ -34,9 +34,9 @@ impl Design {
         fs_from_s(tof_from_range(self.scan.light_range + early)) + self.emission.length_fs()
     }
 
-    /// How a band is cut out of a stream of shots and ticks. Before its first owned shot light must be
-    /// known for as long as that of earlier shots is under way when its ticks begin, and for the
-    /// detector and the converters to forget the state they are started in.
+    /// Returns how a band is cut out of a stream of shots and ticks. Light must be known for some time before
+    /// the first owned shot. This time covers earlier shots whose light is under way when the ticks begin. It
+    /// also lets the detector and the converters forget the state that they start in.
     pub fn cut(&self) -> Cut {
         let jitter_fs = self.most_jitter_fs();
         // Light is looked for to twice the gate: what arrives in it is that of shots the receiver knows. A
@@ -96,8 +96,7 @@ mod tests {
         assert_eq!(design.longest_band_fs() / 1_000_000_000, 158);
     }
 
-    /// What came before the ticks of a band is part of it as long as cells, converters and amplifiers
-    /// remember it.
+    /// A band includes the time before its ticks that cells, converters and amplifiers remember.
     #[test]
     fn a_band_begins_as_early_as_its_detector_and_converters_remember() {
         for (name, key, ns) in [

@@ -72,10 +72,10 @@ impl Chirp {
 
     /// Variance of the beat of light from `tof` seconds away, Hz², over a ramp of `seconds`, for the width of the line.
     ///
-    /// A receiver that takes the spectrum behind a window w(u), u the time in ramps from the middle of one, finds
-    /// 1/(2πT)·∫ q(u)·φ(u) du, q = w·u/∫w·u² du, φ being how far the phase strays. That of the laser now less that of the
-    /// laser τ ago is a sum of independent steps with the variance 2π·Δν per second, each weighted with
-    /// G(u) = ∫ q over τ from u on: the variance is Δν/(2π·T)·∫ G² du.
+    /// A receiver that takes the spectrum behind a window w(u), u the time in ramps from the middle of one,
+    /// finds 1/(2πT)·∫ q(u)·φ(u) du, q = w·u/∫w·u² du. Here φ is how far the phase strays: the phase of the
+    /// laser now less that of the laser τ ago. It is a sum of independent steps with the variance 2π·Δν per
+    /// second, each weighted with G(u) = ∫ q over τ from u on. The variance is Δν/(2π·T)·∫ G² du.
     pub fn wander(&self, tof: f64, seconds: f64, window: SpectralWindow) -> f64 {
         const STEPS: u32 = 512;
         // ∫ w·u du up to u, and ∫ w·u² du.
@@ -105,8 +105,8 @@ impl Chirp {
     ///
     /// (2/T²)·∫₀ᵀ (T − u)·exp(−2π·Δν·min(u, τ)) du
     ///
-    /// It is what is left of the peak, the mean over all ramps: the difference of two phases that are τ apart wanders with
-    /// the variance 2·2π·Δν·min(u, τ) in the time u.
+    /// It is the part that is left of the peak, the mean over all ramps. The difference of two phases that
+    /// are τ apart wanders with the variance 2·2π·Δν·min(u, τ) in the time u.
     pub fn coherence(&self, tof: f64, seconds: f64) -> f64 {
         let rate = 2.0 * PI * self.linewidth;
         let until = tof.clamp(0.0, seconds);

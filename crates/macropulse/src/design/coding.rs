@@ -17,18 +17,18 @@ pub(super) struct CodeFile {
     /// Length of a chip, ps: a whole number of ticks.
     #[schemars(range(min = 0.001, max = 1e9))]
     chip_ps: f64,
-    /// What a bit is: 1 is the code word, 0 is dark or its complement.
+    /// Keying of a bit: 1 is the code word, 0 is dark or its complement.
     keying: KeyingFile,
-    /// What a shot carries.
+    /// The label that a shot carries.
     pub label: Label,
     /// Bits of the label, which must number all columns.
     #[schemars(range(min = 1, max = 16))]
     label_bits: u32,
     /// Checksum behind the label.
     crc: CrcFile,
-    /// Whether a lit bit goes before the label.
+    /// True if a lit bit goes before the label.
     sync_bit: bool,
-    /// Whether labels that send no light are accepted.
+    /// True if labels that send no light are accepted.
     allow_dark: bool,
     /// Which code word a pixel is sent with: pixel n, row by row, with word `first` + n mod
     /// `modulus`.
@@ -62,7 +62,7 @@ pub(super) struct CrcFile {
     width: u8,
     /// Its polynomial, without the leading term.
     polynomial: u8,
-    /// What its register holds at the start.
+    /// Value of its register at the start.
     init: u8,
 }
 

@@ -3,7 +3,7 @@
 use super::Design;
 use crate::units::{range_from_tof, s_from_fs, tof_from_range};
 
-/// What follows from a design. SI units.
+/// Figures that follow from a design. SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Derived {
     /// Mean time between shots, s.
@@ -31,8 +31,8 @@ pub struct Derived {
     pub unambiguous_range: Option<f64>,
     /// Range covered by one tick, m.
     pub tick_range: f64,
-    /// Highest refresh rate of a sensor with as many directions and beams that waits for every echo
-    /// before the next shot, 1/s.
+    /// Highest refresh rate, 1/s, of a sensor with the same number of directions and beams that waits for
+    /// every echo before the next shot.
     pub idle_listening_rate: f64,
     /// Mean photons per mark from the reference target.
     pub reference_photons: f64,

@@ -42,7 +42,7 @@ impl Effect {
         }
     }
 
-    /// What is assumed when it is left out.
+    /// The assumption that replaces it when it is left out.
     pub fn assumption(self) -> &'static str {
         match self {
             Self::Footprint => "the beam is a line without width",

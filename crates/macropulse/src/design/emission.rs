@@ -1,4 +1,5 @@
-//! What a shot sends: a macropulse, a burst of equal pulses, `[burst]`, or light whose power or frequency is modulated.
+//! The light of a shot: a macropulse, a burst of equal pulses, `[burst]`, or light whose power or frequency
+//! is modulated.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -7,7 +8,7 @@ use super::limits::Check;
 use super::{Chirp, Clock, Coding, Error, Modulation};
 use crate::units::{fs_from_s, s_from_fs};
 
-/// What a shot sends.
+/// The light that a shot sends.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Emission {
     /// One macropulse: the pulses ("marks") of a code word, a single one where shots are not coded.
@@ -66,12 +67,12 @@ impl Emission {
         }
     }
 
-    /// Whether it sends pulses.
+    /// True if it sends pulses.
     pub fn is_pulsed(&self) -> bool {
         matches!(self, Self::Marks(_) | Self::Burst(_))
     }
 
-    /// Whether shots carry a code.
+    /// True if shots carry a code.
     pub fn is_coded(&self) -> bool {
         self.coding().label.is_some()
     }

@@ -28,8 +28,7 @@ pub(super) const FAMILIES: &[&str] = &[
 pub(super) enum FamilyFile {
     /// Prime sequence code over an odd prime p up to 251: p words of p² chips, p of them lit.
     Prime(u32),
-    /// The same in blocks of 2p − 1 chips, of which any two words share one mark at most; p up to
-    /// 181.
+    /// The same in blocks of 2p − 1 chips, in which any two words share one mark at most; p up to 181.
     ExtendedPrime(u32),
     /// Quadratic congruence code over an odd prime p up to 251: p − 1 words of p² chips.
     QuadraticCongruence(u32),
@@ -56,7 +55,7 @@ pub(super) struct OrthogonalFile {
     length: u32,
     /// Marks of a word.
     weight: u32,
-    /// Number of words; without it as many as a search finds.
+    /// Number of words; without it all that a search finds.
     words: Option<u32>,
 }
 
@@ -69,10 +68,10 @@ pub(super) struct SparseFile {
     weight: u32,
     /// Number of words, up to 65535.
     words: u32,
-    /// From each mark to the next there are so many chips at least.
+    /// Least distance from each mark to the next, in chips.
     #[serde(default = "one")]
     gap: u32,
-    /// What the words are drawn by.
+    /// Seed by which the words are drawn.
     seed: u64,
 }
 
@@ -85,17 +84,17 @@ pub(super) struct SeparatedFile {
     weight: u32,
     /// Number of words, up to 4096.
     words: u32,
-    /// Every distance between marks of a word is so many chips at least.
+    /// Least distance between marks of a word, in chips.
     #[serde(default = "one")]
     gap: u32,
-    /// Every two distances, of all words, differ by so many chips at least.
+    /// Least difference between any two distances, of all words, in chips.
     #[serde(default = "one")]
     apart: u32,
-    /// Up to how many words later an echo of a word may come, 0 to 16. A channel is blind for `gap` chips behind
-    /// each mark that it sends: words are looked for of which no echo loses two marks to that, or few.
+    /// Up to how many words later an echo of a word may come, 0 to 16. A channel is blind for `gap` chips
+    /// behind each mark that it sends. Words are drawn so that no echo, or few, loses two marks to that.
     #[serde(default = "two")]
     later: u32,
-    /// What the words are drawn by.
+    /// Seed by which the words are drawn.
     seed: u64,
 }
 

@@ -39,7 +39,7 @@ pub(super) struct LightFile {
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) enum EnergyFile {
-    /// What laser class 1 allows.
+    /// The energy that laser class 1 allows.
     #[serde(rename = "class-1")]
     Class1,
     /// Energy, nJ.

@@ -1,4 +1,4 @@
-//! What every section of a sensor file asks of its values.
+//! Rules for the values of every section of a sensor file.
 
 use super::Error;
 use super::document::Chain;

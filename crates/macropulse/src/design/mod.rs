@@ -1,4 +1,4 @@
-//! What the sensor is: from a TOML file to a checked [`Design`].
+//! The sensor: from a TOML file to a checked [`Design`].
 //!
 //! 1. `document`: the text, what it extends, and the defaults become one table, and every value
 //!    remembers its line and column.
@@ -76,17 +76,17 @@ pub struct Design {
     pub name: String,
     /// One sentence.
     pub summary: String,
-    /// Where and when the sensor looks.
+    /// Directions and times at which the sensor looks.
     pub scan: Scan,
     /// The light it sends.
     pub light: Light,
-    /// What a shot sends.
+    /// The light of a shot.
     pub emission: Emission,
-    /// Where the photons come from; `None` where the detector is declared by its sensitivity.
+    /// Source of the photons; `None` if the detector is declared by its sensitivity.
     pub budget: Option<Budget>,
     /// From light to detection events.
     pub detector: Detector,
-    /// What the receiver counts in.
+    /// The ticks in which the receiver counts.
     pub clock: Clock,
     /// From what the detector puts out to the record.
     pub readout: Readout,
@@ -98,7 +98,7 @@ pub struct Design {
     pub idealised: Vec<Effect>,
     /// Values taken from the defaults: dotted key and value.
     pub defaults: Vec<(String, String)>,
-    /// What a user should know although it is no error.
+    /// Remarks for a user that are no errors.
     pub warnings: Vec<String>,
     /// The whole sensor as TOML, defaults included: the same design without the files it extends. A
     /// calibration or a table stays in its file.
@@ -120,7 +120,7 @@ impl Design {
         Self::from_toml(&text, &origin, &folder, overrides)
     }
 
-    /// Whether its receiver measures radial velocities.
+    /// True if its receiver measures radial velocities.
     pub fn measures_speed(&self) -> bool {
         matches!(&self.receiver.method, Method::Beat(method) if method.ramps.len() > 1)
     }
@@ -159,7 +159,7 @@ impl Design {
         check::design(&document::Chain::of_table(table, origin, folder, overrides, &ALTERNATIVES)?)
     }
 
-    /// Whether shots carry a code.
+    /// True if shots carry a code.
     pub fn is_coded(&self) -> bool {
         self.emission.is_coded()
     }
@@ -179,13 +179,13 @@ impl Design {
         self.scan.shots()
     }
 
-    /// Where its pixels lie.
+    /// Directions of its pixels.
     pub fn directions(&self) -> &Directions {
         self.directions.get_or_init(|| self.scan.model().directions())
     }
 
-    /// What laser class 1 allows to a shot; empty where no rule fits the wavelength or the scan, or where
-    /// the detector is declared by its sensitivity. Where eye safety is idealised it is worked out when
+    /// The limits of laser class 1 for a shot. They are empty if no rule fits the wavelength or the scan, or
+    /// if the detector is declared by its sensitivity. If eye safety is idealised, they are worked out when
     /// first asked for.
     pub fn eye_limits(&self) -> &[safety::Limit] {
         let Self { scan, light, emission, .. } = self;
@@ -213,14 +213,14 @@ impl Design {
         hash.text()
     }
 
-    /// What follows from the file, for people to read.
+    /// Figures that follow from the file, for people to read.
     pub fn derived(&self) -> Derived {
         Derived::of(self)
     }
 }
 
-/// A sensor file is wrong: where, and what to do. Where several things are wrong that
-/// do not follow from each other it says all of them, one to a line.
+/// A sensor file is wrong: where, and what to do. If several things are wrong that do not follow from each
+/// other, it says all of them, one to a line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{}", self.sentences().collect::<Vec<_>>().join("\n"))]
 pub struct Error {
@@ -251,8 +251,7 @@ impl Error {
         Some(Self { others: faults.collect(), ..first })
     }
 
-    /// What is wrong: a sentence with its place for each fault, in the order of the file's
-    /// sections.
+    /// A sentence with its place for each fault, in the order of the file's sections.
     pub fn sentences(&self) -> impl Iterator<Item = String> {
         std::iter::once(self).chain(&self.others).map(Self::sentence)
     }

@@ -146,7 +146,7 @@ pub(super) struct ModulationFile {
 }
 
 impl ModulationFile {
-    /// Whether it has no harmonics.
+    /// True if it has no harmonics.
     pub(super) fn is_sine(&self) -> bool {
         self.wave.unwrap_or(Wave::Sine) == Wave::Sine
     }
@@ -229,7 +229,7 @@ mod tests {
         }
     }
 
-    /// What is wrong is one sentence with its key.
+    /// Each fault is told in one sentence with its key.
     #[test]
     fn impossible_modulations_are_refused() {
         for (key, value, told) in [

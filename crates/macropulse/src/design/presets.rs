@@ -1,6 +1,6 @@
 //! The sensors that come with the program.
 
-/// What a sensor file may leave unsaid.
+/// The keys that a sensor file may leave out, with their values.
 pub(super) const DEFAULTS: &str = include_str!("../../../../sensors/defaults.toml");
 
 const PRESETS: [(&str, &str); 20] = [

@@ -1,5 +1,5 @@
-//! What a sensor records, and the clock by which it does: `[tdc]`, `[adc]`, `[histogram]`, `[spectrum]`, or the taps
-//! of modulated light.
+//! The record of a sensor, and the clock by which it is made: `[tdc]`, `[adc]`, `[histogram]`, `[spectrum]`,
+//! or the taps of modulated light.
 
 use std::sync::Arc;
 
@@ -45,7 +45,7 @@ pub struct Clock {
     pub period_fs: i64,
 }
 
-/// What stands behind the detectors and makes the record that the receiver is given.
+/// The part behind the detectors that makes the record for the receiver.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Readout {
     /// Time-to-digital converters (TDC): the ticks of detection events.
@@ -146,7 +146,7 @@ pub(super) struct AdcFile {
     /// Bits of a code, the level without light at a tenth of the range.
     #[schemars(range(min = 4, max = 15))]
     pub bits: u32,
-    /// One step of a code, in the height of a mark of so many detected photons.
+    /// Step of a code: the height of a mark of this number of detected photons.
     #[schemars(range(min = 1e-6, max = 1e9))]
     pub step_photons: f64,
 }
@@ -158,7 +158,7 @@ pub(super) struct HistogramFile {
     /// Width of a bin, ps: a whole number of femtoseconds; the tick of this sensor.
     #[schemars(range(min = 0.001, max = 1e9))]
     bin_ps: f64,
-    /// Bins, the first of which begins when a pulse is sent.
+    /// Number of bins. The first one begins when a pulse is sent.
     #[schemars(range(min = 1, max = 65536))]
     bins: u32,
     /// A pulse of the sensor as it records it, light and detector together: counts of a reference path without
@@ -216,7 +216,7 @@ pub struct Spectrum {
 const SAMPLES: (f64, f64) = (64.0, 65_536.0);
 
 impl Spectrum {
-    /// Samples of a ramp that is recorded for so many seconds.
+    /// Returns the number of samples of a ramp that is recorded for `seconds`.
     pub fn samples(&self, seconds: f64) -> u32 {
         (self.sample_hz * seconds).round() as u32
     }
@@ -234,7 +234,7 @@ impl Spectrum {
 /// Tick of the clock of a sensor of modulated light, fs: no time is measured by it, and its range gate ends to 1.5 mm.
 const TICK_OF_TAPS_FS: i64 = 10_000;
 
-/// Converters start so many dead times before the first ticks of a band, as Geiger cells do.
+/// Converters start this number of dead times before the first ticks of a band, as Geiger cells do.
 const DEAD_TIMES: i64 = 4;
 
 impl Tdc {
@@ -256,7 +256,8 @@ impl Tdc {
 }
 
 impl Check<'_> {
-    /// Ticks, or samples, of which 2²⁶ do not hold the echoes of a shot and of those in flight with it.
+    /// Refuses ticks, or samples, that are too fine: 2²⁶ of them do not hold the echoes of a shot and of
+    /// those in flight with it.
     pub(super) fn too_fine<T>(&self, readout: &Readout) -> Result<T, Error> {
         self.refuse(readout.tick_key(), TOO_FINE)
     }
@@ -280,8 +281,8 @@ impl Check<'_> {
         Ok((self.of_taps().0, Readout::Spectrum(spectrum)))
     }
 
-    /// Whether a `spectrum` holds the beats of the ramps of a `chirp`, light of surfaces up to `farthest` metres that move
-    /// by `fastest` m/s, at this wavelength.
+    /// Refuses a `spectrum` that does not hold the beats of the ramps of a `chirp`. These are beats of
+    /// surfaces up to `farthest` metres that move by up to `fastest` m/s, at this wavelength.
     pub(super) fn bins(
         &self,
         spectrum: &Spectrum,
@@ -384,7 +385,7 @@ impl Check<'_> {
         Ok((Clock { tick_fs, period_fs }, Readout::Tdc(tdc)))
     }
 
-    /// Whether each detector of `scan` has a converter.
+    /// Refuses a bank with fewer converters than `scan` has detectors.
     pub(super) fn share(&self, readout: &Readout, scan: &Scan) -> Result<(), Error> {
         let Some(&Tdc { converters, .. }) = readout.tdc() else { return Ok(()) };
         let channels = scan.channels();

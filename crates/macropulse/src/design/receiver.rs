@@ -44,8 +44,8 @@ pub(super) struct ReceiverFile {
     returns: u32,
     /// Which returns are kept of more, and which one of a pixel its image shows.
     pick: Option<Pick>,
-    /// Marks by which a return is decided at least, none of them blanked (sampled): 2 if it is not given,
-    /// or as many as there are; no more than a word has.
+    /// Least number of marks by which a return is decided, none of them blanked (sampled). 2 if it is not
+    /// given, or 1 if a word has only one; at most the marks of the word with the fewest.
     #[schemars(range(min = 1))]
     least_marks: Option<u32>,
     /// For how long after each mark that is sent no sample counts, ns (sampled).
@@ -64,7 +64,7 @@ pub(super) struct ReceiverFile {
     /// the power (beat); 0 if it is not given.
     #[schemars(range(min = 0, max = 1))]
     least_share: Option<f64>,
-    /// Whether the error that harmonics of the modulation make of a phase is corrected (phase); true if it is not
+    /// True if the phase error made by harmonics of the modulation is corrected (phase). True if it is not
     /// given.
     correct_harmonics: Option<bool>,
     /// Radial velocity of a surface at most, m/s (beat); 60 if it is not given.
@@ -108,7 +108,7 @@ pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 8] = {
     ]
 };
 
-/// What a receiver is given beside its own section of the file.
+/// The inputs of a receiver beside its own section of the file.
 pub(super) struct Inputs<'a> {
     pub detector: &'a DetectorFile,
     pub scan: &'a Scan,
@@ -166,7 +166,7 @@ impl Check<'_> {
         let Some(method) = self.method(file, inputs, light as u32)? else { return Ok(None) };
         let gate_ticks = (gate.0 as u32, gate.1 as u32);
         let receiver = Receiver { tick_fs: clock.tick_fs, gate_ticks, returns, pick, method };
-        // What the receiver itself asks before it decodes; the keys ask most of it already.
+        // The receiver's own check before it decodes; the keys ask most of it already.
         match receiver.check(&coding.codebook) {
             Err(decode::Error::TooLong { what, ticks, possible }) => self.refuse(
                 "code",
@@ -180,7 +180,7 @@ impl Check<'_> {
         }
     }
 
-    /// How it decodes, of light that is followed for so many ticks.
+    /// Returns the method by which it decodes, for light that is followed for `light_ticks`.
     fn method(
         &self,
         file: &ReceiverFile,
@@ -315,7 +315,7 @@ impl Check<'_> {
         Ok((wanted as u8, file.pick.unwrap_or(otherwise)))
     }
 
-    /// Whether a receiver of this kind understands what is sent.
+    /// Refuses a kind of receiver that does not understand the code.
     fn can_read(&self, kind: ReceiverKind, coding: &Coding) -> Result<(), Error> {
         let bit_by_bit = matches!(kind, ReceiverKind::Literal | ReceiverKind::Blind);
         if bit_by_bit && coding.label == Some(Label::None) {

@@ -1,4 +1,4 @@
-//! What recorded shots, ticks and samples are held against before they are decoded.
+//! Properties of a design by which recorded shots, ticks and samples are checked before they are decoded.
 
 use macropulse_codec::decode::{self, Returns};
 use macropulse_codec::files::{
@@ -25,7 +25,7 @@ impl Design {
         }
     }
 
-    /// What its receiver is given beside the shot log.
+    /// Returns the kind of record that its receiver decodes, beside the shot log.
     pub fn records(&self) -> RecordKind {
         self.readout.records()
     }
@@ -42,7 +42,7 @@ impl Design {
         }
     }
 
-    /// What its receiver makes of a record of the shots of `log`: returns of the owned ones, by their place in it.
+    /// Decodes a record of the shots of `log` into returns of the owned ones, by their place in it.
     ///
     /// # Errors
     /// As [`Receiver::decode`](macropulse_codec::decode::Receiver::decode).
@@ -54,8 +54,7 @@ impl Design {
         self.receiver.decode(&self.emission.coding().codebook, log, record)
     }
 
-    /// What is said of its samples before they come, their number left open; `None` of a sensor that
-    /// records ticks.
+    /// Returns the header of its samples, with their number left open; `None` if the detector is not sampled.
     pub fn sample_header(&self) -> Option<SampleHeader> {
         let Detector::Sampled(sampled) = &self.detector else { return None };
         Some(SampleHeader {
@@ -68,7 +67,8 @@ impl Design {
         })
     }
 
-    /// What is said of its histograms before they come, their number left open; `None` of a sensor that records none.
+    /// Returns the header of its histograms, with their number left open; `None` of a sensor that records
+    /// none.
     pub fn histogram_header(&self) -> Option<HistogramHeader> {
         let bins = self.readout.histogram()?.bins;
         Some(HistogramHeader {
@@ -80,13 +80,13 @@ impl Design {
         })
     }
 
-    /// What is said of its taps before they come, their number left open; `None` of a sensor that records none.
+    /// Returns the header of its taps, with their number left open; `None` of a sensor that records none.
     pub fn tap_header(&self) -> Option<TapHeader> {
         let taps = self.emission.modulation()?.taps();
         Some(TapHeader { taps, digest: Some(self.recorded_digest()), count: None })
     }
 
-    /// What is said of its beats before they come, their number left open; `None` of a sensor that records none.
+    /// Returns the header of its beats, with their number left open; `None` of a sensor that records none.
     pub fn beat_header(&self) -> Option<BeatHeader> {
         let Detector::Coherent(coherent) = &self.detector else { return None };
         Some(BeatHeader {
@@ -97,9 +97,9 @@ impl Design {
         })
     }
 
-    /// The hash of all that is sent and how it is timed: the codebook chip by chip, the lengths of
-    /// chips and ticks, which pixel is sent what, and when. What the receiver is set to, its gate
-    /// included, is not in it: the same record may be decoded in many ways.
+    /// Returns the hash of all that is sent and how it is timed. It covers the codebook chip by chip, the
+    /// lengths of chips and ticks, and what is sent to which pixel, and when. The settings of the receiver,
+    /// its gate included, are not in it: the same record may be decoded in many ways.
     pub fn recorded_digest(&self) -> Digest {
         let mut hash = crate::digest::Digest::new();
         let mut numbers = |values: &[u64]| {

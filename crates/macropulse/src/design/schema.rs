@@ -11,8 +11,8 @@ use crate::schema;
 
 /// The JSON Schema of a sensor file, by which editors complete and check it.
 ///
-/// What the built-in defaults give may be left out of any file, and what must be there only of one
-/// that extends no other.
+/// A key with a built-in default may be left out of any file. Other keys must be there only in a file that
+/// extends no other.
 pub fn schema() -> Value {
     let mut sensor = schema::of::<SensorFile>("Macropulse sensor").to_value();
     let defaults = presets::DEFAULTS.parse().unwrap_or_default();
@@ -33,8 +33,8 @@ pub fn schema() -> Value {
     sensor
 }
 
-/// Of each group of keys that exclude each other in the table called `name`, and in those below it,
-/// there must be one.
+/// Demands one of each group of keys that exclude each other, in the table called `name` and in those below
+/// it.
 fn exactly_one(table: &mut Value, name: &str) {
     let named = ALTERNATIVES.iter().filter(|(group, _)| !group.is_empty() && *group == name);
     let groups = named.map(|(_, kinds)| {
@@ -51,7 +51,7 @@ fn exactly_one(table: &mut Value, name: &str) {
     }
 }
 
-/// Writes `defaults` into the schema of a table. What has one may be left out; a table, where
+/// Writes `defaults` into the schema of a table. A key with a default may be left out. So may a table, if
 /// nothing is left in it that must be there.
 fn may_be_left_out(table: &mut Value, defaults: &toml::Table) {
     for (key, default) in defaults {

@@ -1,19 +1,18 @@
 //! How much a band may take to compute: what grows with a ratio of keys has a limit here.
 //!
-//! A band is the least that is computed in one go. What it takes grows with the number of pixels, and beside
-//! that with how many shots are under way at once, how many samples a gate has, and how many counts come within
-//! it.
+//! A band is the least that is computed in one go. Its cost grows with the number of pixels. It also grows
+//! with the shots that are under way at once, the samples of a gate, and the counts within it.
 
 use super::detector::Detector;
 use super::limits::Check;
 use super::{Design, Error};
 use crate::units::{FS_PER_S, s_from_fs};
 
-/// A band holds about this many shots, in whole lines: few enough for the detection events of a coded sensor
-/// to stay in a cache, enough for the guard shots, 125 of `kim-park-2016`, to be a small part. With half as many that
-/// takes a twentieth longer, and of 407 040 shots of `street` as declared 75 instead of 62 are near their surface and
-/// not on it (mean of seeds 5, 101, 202, 303), as less is known of their neighbours. These are four of its lines; five
-/// are more than [`Design::longest_band_fs`] allows.
+/// A band holds about this many shots, in whole lines. They are few enough for the detection events of a
+/// coded sensor to stay in a cache, and the guard shots, 125 of `kim-park-2016`, are a small part. Half the
+/// number takes a twentieth longer, and less is known of a shot's neighbours: 75 instead of 62 of 407 040
+/// shots of `street` as declared are then near their surface and not on it (mean of seeds 5, 101, 202, 303).
+/// It holds four lines of `kim-park-2016`; five are more than [`Design::longest_band_fs`] allows.
 pub const SHOTS_OF_BAND: u64 = 3400;
 
 /// Shots that must be known around those of a band.
@@ -60,7 +59,8 @@ impl Design {
 }
 
 impl Design {
-    /// The same of histograms of bursts of so many `pulses`, with `per_cycle` counts from one to the next.
+    /// As [`Design::too_many_counts`], for histograms of bursts of `pulses`, with `per_cycle` counts from one
+    /// pulse to the next.
     fn too_many_in_a_burst(&self, per_cycle: f64, pulses: u32) -> Option<String> {
         let counts = per_cycle * f64::from(pulses);
         (counts > MOST_COUNTS).then(|| {
@@ -73,7 +73,7 @@ impl Design {
 }
 
 impl Check<'_> {
-    /// Whether a band of `design`, whose clock was checked, can be computed in bounded time.
+    /// Refuses a `design`, whose clock was checked, if a band of it cannot be computed in bounded time.
     pub(super) fn work(&self, design: &Design) -> Result<(), Error> {
         let per_s = design.shots_per_scan() as f64 / design.scan_period();
         let known = s_from_fs(design.around_fs()) * per_s;

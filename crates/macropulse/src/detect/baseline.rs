@@ -1,15 +1,15 @@
 //! The baseline of an amplifier that is coupled by a capacitor: a high-pass of first order.
 //!
-//! With the angular cutoff ω the baseline b follows the signal x by db/dt = ω·(x − b), and x − b goes on. Of a
-//! signal that is held from sample to sample, T apart, that is exactly
+//! With the angular cutoff ω the baseline b follows the signal x by db/dt = ω·(x − b), and x − b goes on. If
+//! the signal is held from sample to sample, T apart, this is exactly
 //!
 //! bₙ₊₁ = a·bₙ + (1 − a)·xₙ, a = exp(−ω·T):
 //!
 //! behind a pulse of charge Q = ∫x dt the baseline lies ω·Q lower and comes back with exp(−ω·t), and in the
 //! mean over time nothing is left of any light.
 //!
-//! A recursion has no beginning. What the baseline is where a block of ticks begins is therefore worked out
-//! from so many blocks before it as it remembers, always the same ones, and so is the same in every band.
+//! A recursion has no beginning. So the baseline at the start of a block of ticks follows from the blocks
+//! before it that it remembers. These are always the same, so it is the same in every band.
 
 use crate::design::detector::{BASELINE_BLOCK, Sampled};
 
@@ -22,7 +22,7 @@ const LANES: usize = 8;
 /// The coupling of an amplifier.
 #[derive(Debug)]
 pub(super) struct Baseline {
-    /// What is left of the baseline after a tick, a.
+    /// Share of the baseline that is left after a tick, a.
     keeps: f64,
     /// Blocks that it remembers.
     blocks: usize,
@@ -43,12 +43,12 @@ impl Baseline {
     }
 
     /// Takes the baseline away from a signal whose first value is that of tick `first`, at which a block
-    /// begins. Of the first blocks, those that it remembers, the baseline is not known and nothing is taken
-    /// away.
+    /// begins. The baseline of the first blocks, those that it remembers, is not known, and nothing is taken
+    /// away from them.
     pub fn take_from(&self, level: &mut [f32], first: i64) {
         debug_assert_eq!(first.rem_euclid(BASELINE_BLOCK), 0);
         let over_block = libm::exp(libm::log(self.keeps) * BASELINE_BLOCK as f64);
-        // What each block alone makes of a baseline at zero.
+        // The baseline behind each block alone, if it is zero before.
         let mut made = vec![0.0; level.len() / BLOCK];
         self.follow(level, &mut made, |_, _| {});
         let at = |number: usize| {
@@ -77,7 +77,7 @@ impl Baseline {
         }
     }
 
-    /// The same of so many blocks of one length.
+    /// Follows the baseline through `N` blocks of one length, as [`Self::follow`] does.
     fn side_by_side<const N: usize>(
         &self,
         level: &mut [f32],

@@ -1,4 +1,4 @@
-//! What the detector of one channel sees of a band, and when it listens.
+//! The part of a band that the detector of one channel sees, and the times at which it listens.
 
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
@@ -25,7 +25,7 @@ pub(super) struct Arrangement {
     stretches: Vec<(u16, u32)>,
 }
 
-/// What the detector of one channel is given of a band.
+/// The part of a band that the detector of one channel is given.
 pub(super) struct Channel<'a> {
     pub number: u16,
     pub clock: Clock,
@@ -34,8 +34,8 @@ pub(super) struct Channel<'a> {
     pub light: &'a Light<'a>,
     /// Detections per photon.
     efficiency: f64,
-    /// The pulse trains that it sees, in the order in which they begin to arrive: the time in the
-    /// upper half of each number, 0 where it lies before the epoch, the index in the lower half.
+    /// The pulse trains that it sees, in the order in which they begin to arrive. The upper half of each
+    /// number is the time, 0 if it lies before the epoch. The lower half is the index.
     pub order: Cow<'a, [u64]>,
     /// The shots that it listens to, in the order of time.
     pub shots: Vec<u32>,
@@ -50,7 +50,7 @@ impl Arrangement {
     /// Puts the pulse trains and the background of `light` and the shots of `log` in the order of
     /// their channels.
     pub fn fill(&mut self, design: &Design, clock: &Clock, log: &ShotLog, light: &Light) {
-        // What arrives later than a band is counted arrives when no gate is open.
+        // Light that arrives later than the clock of a band counts arrives when no gate is open.
         let arrival = |(index, arrives_fs): (usize, &i64)| {
             let time = u32::try_from(clock.time(*arrives_fs).max(0)).ok()?;
             Some(u64::from(time) << 32 | index as u64)

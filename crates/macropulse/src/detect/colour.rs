@@ -6,7 +6,7 @@ use crate::random::{Address, Chance, Stage};
 /// Ticks to either side over which noise is smoothed.
 const HALF: usize = 24;
 
-/// Points of the spectrum: twice as many as the filter has weights, and more.
+/// Points of the spectrum: about twice the number of weights of the filter.
 const POINTS: usize = 4 * HALF;
 
 /// Numbers drawn at once, of two words each.
@@ -25,8 +25,7 @@ pub(super) struct Colour {
 }
 
 impl Colour {
-    /// Noise of which values n ticks apart have the `covariance` of n, and single ones the
-    /// `third_cumulant`.
+    /// Creates noise. Values n ticks apart have the `covariance` of n, and single ones the `third_cumulant`.
     ///
     /// The filter is the symmetric one whose gain is the root of the spectrum. The numbers it smooths are
     /// a·g + c·(g² − 1) with a² + 2c² = 1, whose third cumulant is 6c − 4c³, c to the first order.
@@ -56,8 +55,8 @@ impl Colour {
 
     /// Adds the noise of `part` from tick `first` on to `level`.
     ///
-    /// The normal numbers are how many of 64 random bits are set, less 32, over 4: their mean is 0, their
-    /// variance 1 and their excess −1/32, of which the smoothing leaves a tenth.
+    /// A normal number is the count of set bits among 64 random ones, less 32, over 4. The mean is 0, the
+    /// variance 1 and the excess −1/32. The smoothing leaves a tenth of the excess.
     pub fn add(&self, (chance, part): (&Chance, u32), first: i64, level: &mut [f32]) {
         let block = BLOCK as i64;
         let (mut white, mut numbers): (Vec<f32>, _) = (Vec::new(), Vec::new());

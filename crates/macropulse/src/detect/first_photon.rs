@@ -1,9 +1,9 @@
 //! The first photon of a micropulse that is longer than the detector's own.
 //!
-//! A detector that counts photons answers a mark with one event. If the micropulse is as short as
-//! its own, the event comes with the mark; if it is longer, as those of an interferer may be, with
-//! the first photon: of n photons spread over a Gaussian of rms length σ the first comes at
-//! σ·Φ⁻¹(Λ/n), where Λ is drawn from the unit exponential below n.
+//! A detector that counts photons answers a mark with one event. If the micropulse is as short as its own,
+//! the event comes with the mark. If it is longer, as that of an interferer may be, the event comes with the
+//! first photon. If n photons are spread over a Gaussian of rms length σ, the first comes at σ·Φ⁻¹(Λ/n). Here
+//! Λ is drawn from the unit exponential below n.
 
 use macropulse_codec::statistics::normal_quantile;
 
@@ -17,8 +17,8 @@ pub(super) struct FirstPhoton {
 }
 
 impl FirstPhoton {
-    /// Of micropulses of length `pulse` s with `photons` each, at a detector whose own micropulses
-    /// have the length `own` s; `None` where they are no longer than its own.
+    /// Returns the first photon of micropulses of length `pulse` s with `photons` each, at a detector whose
+    /// own micropulses have the length `own` s. `None` if they are no longer than its own.
     pub fn of(photons: f64, pulse: f64, own: f64) -> Option<Self> {
         let rms_fs = pulse * RMS_OF_FWHM * FS_PER_S as f64;
         (pulse > own).then_some(Self { photons: photons.min(PLENTY), rms_fs })

@@ -9,10 +9,10 @@
 //! 4. A cell works whether or not the detector is listened to: what fires it between two gates, or in
 //!    the gate before, blinds it in the next one. So cells are followed from several dead times before
 //!    each gate on, through all gates that follow sooner, and the firings while a gate is open are events.
-//! 5. Where that begins, a cell is blind with the probability ρ = r·τ/(1 + r·τ) that the steady rate r of
-//!    counts per cell leaves, τ the dead time, and for a time that is even between 0 and τ: the
-//!    stationary state of a cell in steady light. The guard shots of a band reach as far back
-//!    ([`Design::cut`](crate::design::Design::cut)).
+//! 5. When a cell begins to be followed, it is blind with probability ρ = r·τ/(1 + r·τ). Here r is the steady
+//!    rate of counts per cell, and τ the dead time. A blind cell stays blind for a time that is even between
+//!    0 and τ. This is the stationary state of a cell in steady light. The guard shots of a band reach
+//!    equally far back ([`Design::cut`](crate::design::Design::cut)).
 //!
 //! A single cell with a dead time as long as the range gate is the detector that fires once per
 //! arm time.
@@ -27,7 +27,7 @@ use crate::design::detector::{Geiger, Model};
 use crate::random::{Address, Chance, Stage, Stream};
 use crate::units::{FS_PER_S, fs_from_s, s_from_fs};
 
-/// So many photons for each cell fire all that are armed.
+/// This number of photons for each cell fires all that are armed.
 const FLOOD: f64 = 64.0;
 
 /// Stands for all cells.
@@ -81,7 +81,7 @@ impl Kind for Cells {
 }
 
 impl Cells {
-    /// Where the random numbers of a moment stand, given in parts of a tick from the epoch on.
+    /// Returns the address of the random numbers of a moment, given in parts of a tick from the epoch on.
     fn address(&self, stage: Stage, channel: &Channel, time: i64) -> Address {
         let index = (channel.clock.epoch_parts() + time) as u64;
         Address { stage, index, part: u32::from(channel.number) << PART_BITS }
@@ -212,11 +212,10 @@ mod tests {
         (0..bands).map(of_band).collect()
     }
 
-    /// H0: from the first owned shot on, one cell with dead time τ in light of rate r fires
-    /// r/(1 + r·τ) times a second, be it that it was started anew with every band. N = 400 bands,
-    /// the first half of a dead time of each, seed 7, α = 1e-4 (|z| < 3.9). Control: were it armed
-    /// when the first owned shot is fired, r·τ/2 = 1 event would come in that time, and half of
-    /// them are missing.
+    /// H0: from the first owned shot on, one cell with dead time τ in light of rate r fires r/(1 + r·τ) times
+    /// a second. That it is started anew with every band does not matter. N = 400 bands, the first half of a
+    /// dead time of each, seed 7, α = 1e-4 (|z| < 3.9). Control: were it armed when the first owned shot is
+    /// fired, r·τ/2 = 1 event would come in that time, and half of them are missing.
     #[test]
     fn a_cell_is_as_blind_at_the_seam_of_bands_as_anywhere() {
         // τ = 200 ns, r = 1e7: ρ = 2/3.
@@ -233,8 +232,7 @@ mod tests {
         assert!(z(bands as f64 * (1.0 - (-1.0_f64).exp())).abs() > 3.9);
     }
 
-    /// One cell, dead for longer than the pause between two gates and than its gate, in the dark but for so many
-    /// counts a second.
+    /// Returns a sensor with one cell, dead for `dead_ns`, in the dark but for `rate` counts a second.
     fn gated(dead_ns: f64, rate: f64) -> Design {
         let text = format!(
             "version = 1\nname = \"mine\"\nidealised = [\"footprint\", \"mirror-motion\", \

@@ -1,10 +1,9 @@
 //! How late a detection event is: Gaussian jitter, rounded to parts of a tick.
 //!
-//! What is rounded takes only so many values, and Walker's method \[Walker77\] draws one of n
-//! values with one number: it falls into one of n cells of equal size, each shared by two values.
-//! The probabilities are those of the Gaussian between two rounded values, so that nothing is lost
-//! by rounding first. Jitter of more than [`EXACT`] parts is drawn coarser and spread evenly
-//! within the cell.
+//! A rounded delay takes one of n values, and Walker's method \[Walker77\] draws it with one number. The
+//! number falls into one of n cells of equal size, each shared by two values. The probabilities are those of
+//! the Gaussian between two rounded values, so that nothing is lost by rounding first. Jitter of more than
+//! [`EXACT`] parts is drawn coarser and spread evenly within the cell.
 
 use macropulse_codec::statistics::normal_tail;
 
@@ -65,15 +64,14 @@ impl Jitter {
 
 /// Probability that a Gaussian of standard deviation `sigma` is rounded to `value`.
 fn probability(value: i16, sigma: f64) -> f64 {
-    // Where it is small it is the difference of small numbers, not of large ones.
+    // A small probability is the difference of small numbers here, not of large ones.
     let from = f64::from(value).abs() - 0.5;
     let beyond = |x: f64| normal_tail(x / sigma);
     beyond(from) - beyond(from + 1.0)
 }
 
-/// Shares out as many cells as there are values, each with the bound below which its own value is
-/// drawn, that value, and the other one: of two values with too small and too large a
-/// share the larger one fills up the cell of the smaller one.
+/// Returns one cell per value, each with the bound below which its own value is drawn, that value, and the
+/// other one. The cell of a value with too small a share is filled up by one with too large a share.
 fn cells(shares: &[(i16, f64)]) -> Vec<u64> {
     let total: f64 = shares.iter().map(|share| share.1).sum();
     let mut left: Vec<f64> =
@@ -124,7 +122,7 @@ mod tests {
     use crate::random::{Address, Chance, Stage};
     use proptest::prelude::*;
 
-    /// What each value gets of 2³² equally likely numbers, from the bounds of its cells.
+    /// Returns the share of each value in 2³² equally likely numbers, from the bounds of its cells.
     fn shares_of(jitter: &Jitter) -> std::collections::HashMap<i16, f64> {
         let mut shares = std::collections::HashMap::new();
         let cells = jitter.amounts.cells();

@@ -7,10 +7,10 @@
 //!    the noise does to the slope.
 //! 5. Between marks, noise crosses the threshold at the rate the threshold was set for.
 //!
-//! So it is where the list `idealised` names `inter-chip`: the light of one shot that comes within
-//! the response of the amplifier adds up, light of several shots does not, marks of one word that
-//! follow each other sooner are told apart, and the walk of the crossing with the amplitude is taken
-//! to be calibrated out. Else it is [`super::waveform`] (docs/physics.md#photodiode-and-comparator).
+//! This model applies if the list `idealised` names `inter-chip`. Light of one shot that comes within the
+//! response of the amplifier adds up; light of several shots does not. Marks of one word that follow each
+//! other sooner are told apart. The walk of the crossing with the amplitude counts as calibrated out. Else
+//! [`super::waveform`] applies (docs/physics.md#photodiode-and-comparator).
 
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
@@ -29,8 +29,7 @@ pub(super) const PLENTY: f64 = 1e12;
 #[derive(Debug)]
 pub(super) struct Thresholding {
     linear: LinearSetting,
-    /// Whether the height of a pulse is measured: by the receiver of single pulses, which tells
-    /// reflectance from it.
+    /// True if the height of a pulse is measured: the receiver of single pulses derives reflectance from it.
     measures: bool,
 }
 
@@ -75,7 +74,7 @@ impl Kind for Thresholding {
         counts(self.linear.false_rate, channel, chance, &mut memory.noise);
         let noise = memory.noise.iter();
         events.extend(noise.map(|time| (*time, self.linear.threshold as f32)));
-        // Of several at once the order must not depend on what else is looked at.
+        // The order of simultaneous events must not depend on the other shots that are looked at.
         events.sort_unstable_by(|one, other| one.0.cmp(&other.0).then(other.1.total_cmp(&one.1)));
         found.time.extend(events.iter().map(|event| event.0));
         if self.measures {

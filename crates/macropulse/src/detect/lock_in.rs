@@ -1,9 +1,10 @@
 //! Light to taps: pixels that collect it in step with its modulation.
 //!
-//! Each exposure of a shot is a tap. Light of the shot itself reaches it along all paths at once; a path brings the
-//! charge N/T·(1 + c·cos(2πfτ − θ)) of N detected photons in T taps, τ its time of flight, f and θ frequency and phase
-//! of the tap (or a triangle instead of the cosine). Steady light adds the same to every tap, and pulses of other
-//! lidars what the gain of the tap is when they arrive. The electrons of a tap are a Poisson variable.
+//! Each exposure of a shot is a tap, one of T. Light of the shot itself reaches it along all paths at once. A
+//! path of N detected photons brings the charge N/T·(1 + c·cos(2πfτ − θ)), or that of a triangle instead of
+//! the cosine. Here τ is its time of flight, f and θ are frequency and phase of the tap, and c is its
+//! contrast. Steady light adds the same to every tap. A pulse of another lidar adds its photons times the
+//! gain of the tap at its arrival. The electrons of a tap are a Poisson variable.
 
 use std::f64::consts::TAU;
 
@@ -74,7 +75,7 @@ impl Demodulator {
         })
     }
 
-    /// Adds the electrons of a path along which so many photons of the whole shot come.
+    /// Adds the electrons of a path along which `photons` of the whole shot come.
     fn add_path(&self, means: &mut [f64], photons: f64, tof: f64) {
         let each = photons * self.efficiency / f64::from(self.lock_in.modulation.taps());
         for (mean, (hz, contrast, phase)) in means.iter_mut().zip(self.each_tap()) {

@@ -1,19 +1,18 @@
 //! Events that are marks and nothing else.
 //!
-//! Where no mark is missed or moved and nothing else makes events, what a detector puts out is
-//! known from the code words: it need not be written down mark by mark, sorted and rounded, to be
-//! made ticks.
+//! If no mark is missed or moved and nothing else makes events, the output of a detector follows from the
+//! code words. It need not be written down mark by mark, sorted and rounded, to be made ticks.
 
 use super::Detections;
 use crate::design::Design;
 use crate::kernels::{Macropulse, Words};
 
-/// What the detectors of a sensor make of the light of a band.
+/// The response of the detectors of a sensor to the light of a band.
 #[derive(Debug)]
 pub enum Response<'a> {
     /// Detection events, one by one.
     Events(Detections),
-    /// Macropulses of which every mark makes one event at its arrival.
+    /// Macropulses; every mark makes one event at its arrival.
     Marks(Marks<'a>),
 }
 
@@ -23,8 +22,7 @@ impl From<Detections> for Response<'_> {
     }
 }
 
-/// Macropulses at a sensor with a single channel of which every mark makes an event in the tick in
-/// which it arrives.
+/// Macropulses at a sensor with a single channel. Every mark makes an event in the tick in which it arrives.
 #[derive(Debug)]
 pub struct Marks<'a> {
     /// As [`Detections::epoch`].

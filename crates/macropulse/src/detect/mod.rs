@@ -71,7 +71,7 @@ pub struct Detectors<'a> {
     work: Work,
 }
 
-/// What a detector puts out.
+/// The kind of output of a detector, with the model that makes it.
 #[derive(Debug)]
 enum Work {
     /// Detection events.
@@ -91,21 +91,21 @@ trait Kind: fmt::Debug + Send + Sync {
     /// Adds the events of a channel to those found, in the order of time.
     fn add(&self, channel: &Channel, chance: &Chance, found: &mut Detections, memory: &mut Memory);
 
-    /// The macropulses of `light` in the `order` in which they begin to arrive, as
-    /// [`Channel::order`] has it, if every mark of them makes one event in its tick, and nothing
-    /// else does; `None` where it may be otherwise.
+    /// Returns the macropulses of `light` in the `order` in which they begin to arrive, as [`Channel::order`]
+    /// has it. `None` unless every mark of them is certain to make one event in its tick, and nothing else
+    /// does.
     fn marks(&self, _order: &[u64], _light: &Light) -> Option<(&ExactWords, Vec<Macropulse>)> {
         None
     }
 
-    /// Whether it measures the energy of each pulse.
+    /// Returns true if it measures the energy of each pulse.
     fn measures(&self) -> bool {
         false
     }
 }
 
 impl<'a> Detectors<'a> {
-    /// Whether its events have amplitudes.
+    /// Returns true if its events have amplitudes.
     pub fn measure(&self) -> bool {
         matches!(&self.work, Work::Events(kind) if kind.measures())
     }
@@ -148,8 +148,8 @@ impl<'a> Detectors<'a> {
         Self { design, chance, shape: Shape::of(design), work: Work::Events(kind) }
     }
 
-    /// What `light` makes while the sensor listens to the shots of `log`: marks alone where no
-    /// detection event is anything else, as of a detector that never misses.
+    /// Returns the response to `light` while the sensor listens to the shots of `log`. It is marks alone if
+    /// no detection event is anything else, as of a detector that never misses.
     pub fn response(&self, log: &ShotLog, light: &Light, memory: &mut Memory) -> Response<'_> {
         if let Some(first) = log.fired_at_fs.first()
             && self.shape.is_none()
@@ -331,7 +331,7 @@ mod tests {
         }
     }
 
-    /// H0: light that lasts for a stretch of time makes as many counts as its rate says, there and
+    /// H0: light that lasts for a stretch of time makes the number of counts that its rate says, there and
     /// nowhere else. Mean 4000, seed 9, α = 1e-6 (|z| < 4.9). Control: 10 % more are noticed.
     #[test]
     fn background_of_a_stretch_of_time_is_seen_in_it() {

@@ -1,13 +1,13 @@
 //! Dark and background counts: Poisson in time, with a rate λ(t).
 //!
-//! The steady part of the rate: time is cut into windows, and the counts of each are drawn from its
-//! own address, so that neighbouring bands see the same ones where they overlap. Within a window
-//! the waits from one count to the next are exponential. A process without memory may start anew
-//! with every window. Stretches of time with a rate of their own are windows of their own: counts
-//! of independent Poisson processes add up to one of the summed rate.
+//! The steady part of the rate is cut into windows of time. The counts of each are drawn from its own
+//! address, so that neighbouring bands see the same ones where they overlap. Within a window the waits from
+//! one count to the next are exponential. A process without memory may start anew with every window.
+//! Stretches of time with a rate of their own are windows of their own: counts of independent Poisson
+//! processes add up to one of the summed rate.
 //!
-//! Where there are so many that most would fall into the tick of another one, which the converters
-//! make one of, it is drawn tick by tick whether there is any.
+//! At high rates most counts would fall into the tick of another one, and converters make one event of both.
+//! Then each tick is drawn: lit or dark.
 
 use std::ops::RangeInclusive;
 
@@ -20,10 +20,10 @@ use crate::kernels::{END, Events, GROUP};
 use crate::random::{Address, Chance, Stage};
 use crate::units::FS_PER_S;
 
-/// A wait is rounded to a fraction of its mean, one in so many at least.
+/// A wait is rounded to a fraction of its mean: one part in this number, or finer.
 const FINENESS: f64 = (1 << 18) as f64;
 
-/// So many counts in a tick, on average, are drawn tick by tick.
+/// With more counts in a tick than this, on average, they are drawn tick by tick.
 const CROWDED: f64 = 0.5;
 
 /// Ticks of a window that is drawn tick by tick.
@@ -96,9 +96,9 @@ pub(super) fn counts(steady: f64, channel: &Channel, chance: &Chance, times: &mu
     counts_in(&channel.spans, steady, (channel, chance), times);
 }
 
-/// The counts in the `spans` of a channel, ascending: `steady` ones, per second, and those of the stretches of
-/// background with a rate of their own, from the first span to the last; in `times`, in place of what was
-/// there.
+/// Puts the counts in the `spans` of a channel into `times`, ascending, in place of what was there. `steady`
+/// ones come per second. The stretches of background with a rate of their own add theirs, from the first span
+/// to the last.
 pub(super) fn counts_in(
     spans: &[RangeInclusive<i64>],
     steady: f64,
@@ -136,7 +136,7 @@ pub(super) struct Stretch {
     pub until_fs: i64,
     /// Detections per second.
     pub per_s: f64,
-    /// Where its random numbers stand.
+    /// Address of its random numbers.
     pub address: Address,
 }
 
@@ -158,7 +158,7 @@ pub(super) fn stretches(channel: &Channel) -> impl Iterator<Item = Stretch> {
     })
 }
 
-/// Where counts are drawn.
+/// The span of time in which counts are drawn, with its clock, chance and channel.
 struct Source<'a> {
     clock: &'a Clock,
     /// In parts of a tick from the epoch of the clock on.

@@ -8,8 +8,8 @@
 //! Marks that arrive within one tick make one event in the end: the converters merge them, which is
 //! the hard limiter of the coding literature.
 //!
-//! Echoes are taken in the order in which they begin to arrive, so that the events of one follow
-//! those of all before it, or are merged with the last few of them.
+//! Echoes are taken in the order in which they begin to arrive. So the events of one follow those of all
+//! before it, or are merged with the last few of them.
 
 use super::channel::Channel;
 use super::first_photon::FirstPhoton;
@@ -24,7 +24,8 @@ use crate::kernels::{Macropulse, PAD, Words, append_train, keep_below, merge};
 use crate::random::{Address, Chance, Stage};
 use crate::units::FS_PER_S;
 
-/// Less than one event in so many is put in its place alone, rather than merging all.
+/// If there is less than one count in this number of events, the counts are put in place one by one, rather
+/// than merging all.
 const FEW: usize = 64;
 
 /// The detector, and the language of the light it sees.
@@ -121,11 +122,11 @@ impl Kind for Counting {
     }
 }
 
-/// So many photons of a mark are always seen: what is lost beside 1 is far below the 2⁻³² that is
-/// drawn with.
+/// A mark of this number of detected photons is always seen: the probability that it is not is far below
+/// 2⁻³², the resolution of the draws.
 const PLAIN: f64 = 40.0;
 
-/// What the detector of a channel is given of a band, and its chance.
+/// The part of a band that the detector of a channel is given, and its chance.
 #[derive(Clone, Copy)]
 struct Seen<'a> {
     channel: &'a Channel<'a>,
@@ -133,7 +134,7 @@ struct Seen<'a> {
 }
 
 impl Counting {
-    /// What pulse train `index`, a whole macropulse of the sensor's own, is if it begins at `start`.
+    /// Returns pulse train `index`, a whole macropulse of the sensor's own, as one that begins at `start`.
     #[inline]
     fn macropulse(&self, trains: &PulseTrains, index: usize, start: u32) -> Macropulse {
         let lit = self.lit[usize::from(trains.label[index])];
@@ -151,7 +152,7 @@ impl Counting {
         let (start, index) = ((arrival >> 32) as u32, arrival as u32 as usize);
         let (light, trains) = (channel.light, &channel.light.trains);
         let photons = channel.detected(index);
-        // What is lost beside 1 is far below the 2⁻³² that is drawn with.
+        // The rounding of this difference is far below 2⁻³², the resolution of the draws.
         let detected = if photons.is_infinite() { 1.0 } else { 1.0 - libm::exp(-photons) };
         let seen = Bernoulli::new(self.kept * detected);
         if seen.is_never() {
@@ -384,7 +385,7 @@ mod tests {
             let z = |mean: f64| (found.time.len() as f64 - mean) / mean.sqrt();
             assert!(z(expected).abs() < 4.9, "{} against {expected}", found.time.len());
             assert!(z(expected * (1.0 + 10.0 / expected.sqrt())).abs() > 4.9);
-            // Of exponential waits 1 − 1/e are shorter than the mean.
+            // A share 1 − 1/e of exponential waits is shorter than the mean.
             let mean_wait = 64.0 * 1e15 / 2500.0 / rate.parse::<f64>().unwrap();
             let waits = found.time.windows(2).map(|pair| f64::from(pair[1] - pair[0]));
             let n = found.time.len() as f64 - 1.0;

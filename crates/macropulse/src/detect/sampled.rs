@@ -1,13 +1,13 @@
 //! A sampled detector: the sum of all light behind an amplifier, as codes.
 //!
-//! 1. Of each mark photons are drawn, Poisson, slice by slice of its pulse, and multiplied: the sum of k of
-//!    them by a gain of excess F is gamma-distributed with the mean k and the variance k·(F − 1).
+//! 1. The photons of each mark are drawn, Poisson, slice by slice of its pulse, and multiplied. With a gain
+//!    of excess F, the sum of k of them is gamma-distributed with the mean k and the variance k·(F − 1).
 //! 2. Each slice becomes what the amplifier makes of a photon. All add up, whoever sent them, with the stray
 //!    light of the sensor's own marks.
 //! 3. Noise of the amplifier and of steady light is added, normal with the covariance that both have behind
 //!    the filter, and with the third cumulant that single photons give it.
-//! 4. Where that is more than the converter has codes for, the amplifier is at its limit, and stays there
-//!    behind the pulse until it has recovered.
+//! 4. If that is more than the converter has codes for, the amplifier is at its limit. It stays there behind
+//!    the pulse until it has recovered.
 //! 5. An amplifier that is coupled by a capacitor lets through what is faster than its low cutoff: the
 //!    baseline sinks with all light, and comes back ([`super::baseline`]).
 //! 6. The converter rounds to its steps and stops at its limits.
@@ -36,15 +36,15 @@ use crate::units::{FS_PER_S, RMS_OF_FWHM, fs_from_s, s_from_fs};
 /// Light of one shot this share of the response apart, or nearer, is one pulse.
 const TOGETHER: f64 = 1.0 / 8.0;
 
-/// Slices of a pulse are this share of its rms length, and it is followed to three of them: a Gaussian in
-/// steps of σ/2 is as smooth as one without to 10⁻³⁰.
+/// Length of a slice of a pulse, in rms lengths of the pulse. A pulse is followed to three rms lengths. A
+/// Gaussian in steps of σ/2 is as smooth as one without to 10⁻³⁰.
 const SLICE: f64 = 0.5;
 const SLICES: i32 = 6;
 
 /// Samples that are looked at together for one at the limit.
 const CHUNK: usize = 256;
 
-/// What a photon becomes is followed to where it is less than this share of a step of the converter.
+/// The pulse of a photon is followed to where it is less than this share of a step of the converter.
 const NEGLIGIBLE: f64 = 1.0 / 16.0;
 
 /// A sampled detector at work.
@@ -52,7 +52,7 @@ const NEGLIGIBLE: f64 = 1.0 / 16.0;
 pub(super) struct Sampler {
     sampled: Sampled,
     colour: Colour,
-    /// Where light moves it.
+    /// The baseline, if light moves it.
     baseline: Option<Baseline>,
     tick_fs: i64,
     /// The pulse that the amplifier makes of a photon.
@@ -146,7 +146,7 @@ impl Sampler {
         }
     }
 
-    /// Stray light of own marks: so much of it that its photons need not be drawn.
+    /// Adds the stray light of own marks. It is bright enough that its photons need not be drawn.
     fn add_stray(&self, channel: &Channel, signal: &mut Signal) {
         let codebook = &channel.design.emission.coding().codebook;
         let front_end = &self.sampled.front_end;
@@ -180,7 +180,7 @@ impl Sampler {
         }
     }
 
-    /// What multiplication makes of the photons that come where `photons` do on average.
+    /// Draws the photons at a mean of `photons`, and returns them multiplied.
     fn multiplied(&self, photons: f64, stream: &mut Stream) -> f64 {
         let Ok(poisson) = Poisson::new(photons.min(PLENTY)) else { return 0.0 };
         let count: f64 = poisson.sample(stream);
@@ -288,7 +288,7 @@ impl Signal {
         if to < 0 {
             return;
         }
-        // What lies before the span is worked out, too: the rest is then the same to the last bit, wherever a
+        // The part before the span is worked out, too: the rest is then the same to the last bit, wherever a
         // span begins.
         let at = ((from + self.first - tick) as f64 - part) / rms;
         let mut value = height * libm::exp(-at * at / 2.0);

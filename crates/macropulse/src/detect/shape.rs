@@ -21,9 +21,8 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// The micropulse of a sensor whose light is followed beyond its chip: its detector sees every
-    /// photon by itself. `None` for the others, of which a linear one follows what the pulse becomes
-    /// behind its amplifier.
+    /// The micropulse of a sensor whose light is followed beyond its chip: its detector sees every photon by
+    /// itself. `None` for the others. A linear detector among them follows the pulse behind its amplifier.
     pub fn of(design: &Design) -> Option<Self> {
         let rms = design.detector.spread_of(&design.light)?;
         let width = FINEST * rms;
@@ -50,7 +49,7 @@ impl Shape {
                 spread.trains.push(PulseTrain {
                     arrives_fs: train.arrives_fs + late_fs,
                     photons: train.photons * share,
-                    // What a scene sends back stays below 2000; a study may have more.
+                    // Numbers of ways in a scene stay below 2000; a study may have more.
                     way: train.way.wrapping_mul(slices).wrapping_add(slice),
                     ..train
                 });
@@ -82,7 +81,7 @@ mod tests {
             let square = |(late, share): &(i64, f64)| share * (*late as f64).powi(2);
             let rms = slices.iter().map(square).sum::<f64>().sqrt() * 1e-3;
             let expected: f64 = pulse.parse::<f64>().unwrap() * 0.42466;
-            // What lies beyond three deviations is missing, and slices have a width.
+            // Light beyond three deviations is missing, and slices have a width.
             assert!(expected < 2.0 || (rms / expected - 1.0).abs() < 0.03, "{pulse} ps: {rms} ps");
         }
     }
@@ -91,7 +90,7 @@ mod tests {
     #[test]
     fn a_chip_keeps_three_quarters_of_its_light() {
         let slices = Shape::of(&physical("2.5")).unwrap().slices;
-        // Of a slice at the edge of the chip, the part that is within.
+        // The part of a slice that lies within the chip.
         let width = (slices[1].0 - slices[0].0) as f64;
         let within = |chip: f64| -> f64 {
             let inside = |late: i64| 0.5 + (1250.0 - (late as f64 - chip * 2500.0).abs()) / width;

@@ -15,16 +15,15 @@
 //! 5. A Gaussian sample of the temporal response is added.
 //! 6. If m > 1 the detector measures the amplitude, the photons of the whole pulse: the m that fired
 //!    it and those that come later, k = m + Poisson(n' − Γ_m).
-//! 7. The firing runs ahead of the middle of the pulse the more the stronger the echo is. Of k photons
-//!    that come at normal times, the m-th one comes σ·E(Z_m:k) after the middle on average, Z_m:k the
-//!    m-th smallest of k standard normal variables ([`normal_order`]). This walk follows from m, k and
-//!    the length of the pulse, all of which the sensor knows, and is taken off. The converter
-//!    quantises.
+//! 7. The firing runs ahead of the middle of the pulse the more the stronger the echo is. If k photons come
+//!    at normal times, the m-th one comes σ·E(Z_m:k) after the middle on average. Here Z_m:k is the m-th
+//!    smallest of k standard normal variables ([`normal_order`]). This walk follows from m, k and the length
+//!    of the pulse. The sensor knows all of them, and the walk is taken off. The converter quantises.
 //!
-//! \[KP16\] mixes two kinds of detector here: additive Gaussian noise belongs to a linear-mode
-//! receiver, the cumulative firing probability to a Geiger-mode one. With m ≫ 1 the threshold of
-//! a linear receiver is meant, with m = 1 the Geiger detector: that cannot tell how many photons
-//! follow the first, so that it measures no amplitude, and its walk stays in its ranges.
+//! \[KP16\] mixes two kinds of detector here: additive Gaussian noise belongs to a linear-mode receiver, the
+//! cumulative firing probability to a Geiger-mode one. With m ≫ 1 the threshold of a linear receiver is
+//! meant, with m = 1 the Geiger detector. A Geiger detector cannot tell how many photons follow the first. So
+//! it measures no amplitude, and its walk stays in its ranges.
 
 use std::ops::RangeInclusive;
 
@@ -114,8 +113,8 @@ struct Firing<'a> {
     gamma: Gamma<f64>,
     /// rms length of a micropulse, fs.
     rms_fs: f64,
-    /// Background that fires it as false firings do. What needs more photons than one adds them up,
-    /// and to that it is noise.
+    /// Background that fires it as false firings do. A detector that needs more photons than one adds them
+    /// up: to it, background is noise.
     stretches: Vec<Stretch>,
 }
 
@@ -153,8 +152,8 @@ impl<'a> Firing<'a> {
         self.needed + follow.map_or(0.0, |follow| follow.sample(stream))
     }
 
-    /// How late it fires on average in a pulse of so many photons, fs after its middle, as far as it
-    /// knows them.
+    /// Returns the mean delay of a firing behind the middle of a pulse of `photons`, fs; 0 if it cannot
+    /// measure them.
     fn walk_fs(&self, photons: f64) -> i64 {
         match self.firing.measures() {
             true => (self.rms_fs * normal_order(self.needed, photons).0).round() as i64,
@@ -215,8 +214,8 @@ mod tests {
     use crate::design::Design;
     use macropulse_codec::ShotLog;
 
-    /// The events of shots that all have an echo of so many photons, in the first nine bands or
-    /// what the sensor has of them.
+    /// Returns the events of shots that all have an echo of `photons`. They are those of the first nine
+    /// bands, or of all that the sensor has.
     fn run(design: &Design, photons: f64, seed: u64) -> Vec<(ShotLog, Detections)> {
         let detectors = super::super::Detectors::in_the_dark(design, Chance::new(seed));
         let bands = crate::emit::bands(design, 0).take(9);
@@ -390,8 +389,8 @@ mod tests {
         assert_eq!(seen, 1);
     }
 
-    /// What comes back from beyond the gate of one shot fires the detector in the gate of the next:
-    /// the second time around. Control: with more time between the shots it does not.
+    /// Light from beyond the gate of one shot fires the detector in the gate of the next: the second time
+    /// around. Control: with more time between the shots it does not.
     #[test]
     fn light_of_an_earlier_shot_fires_the_detector_again() {
         let open = |rate: &str| {

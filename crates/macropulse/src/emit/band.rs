@@ -10,7 +10,8 @@ use super::times::{EqualSteps, fired_at_fs};
 use crate::design::{Design, SHOTS_OF_BAND};
 use macropulse_codec::ShotLog;
 
-/// About as many shots are in a band where a few bands stand for a scan: so few that some thousand shots come from several places.
+/// Approximate number of shots in a band if a few bands stand for a scan. It is small, so that some thousand
+/// shots come from several places.
 const SHOTS_OF_FEW: u64 = 1700;
 
 /// Shots of a log that are worked out together.
@@ -32,12 +33,12 @@ pub fn bands(design: &Design, scan: u64) -> impl Iterator<Item = Band> {
     bands_of(design, scan, SHOTS_OF_BAND)
 }
 
-/// Bands half as long, of which a few are computed where they are to stand for the whole scan.
+/// Returns bands half as long. A few of them are computed if they are to stand for the whole scan.
 pub fn short_bands(design: &Design, scan: u64) -> impl Iterator<Item = Band> {
     bands_of(design, scan, SHOTS_OF_FEW)
 }
 
-/// The bands of about so many `shots`.
+/// Returns the bands of about `shots` each.
 fn bands_of(design: &Design, scan: u64, shots: u64) -> impl Iterator<Item = Band> {
     let total = design.shots_per_scan();
     let step = shots_of_band(design, shots);
@@ -52,8 +53,8 @@ fn bands_of(design: &Design, scan: u64, shots: u64) -> impl Iterator<Item = Band
     })
 }
 
-/// How many of these `shots` of a scan, from the first on, the clock of one band counts: all of them, unless
-/// there is a pause between them that is longer.
+/// Returns the number of these `shots` of a scan, from the first on, that the clock of one band counts. These
+/// are all, unless there is a pause between them that is longer.
 fn fitting(design: &Design, scan: u64, shots: Range<u64>) -> u64 {
     let count = shots.end.saturating_sub(shots.start);
     let fired = |shot: u64| fired_at_fs(design, scan, shots.start + shot);
@@ -75,8 +76,8 @@ fn most(counts: RangeInclusive<u64>, fits: impl Fn(u64) -> bool) -> u64 {
     low
 }
 
-/// Shots of every band but the last, about so many `shots`: whole lines, or equal parts of a line where a line
-/// takes longer than the clock of a band counts.
+/// Returns the number of shots in every band but the last, about `shots`. These are whole lines, or equal
+/// parts of a line that takes longer than the clock of a band counts.
 fn shots_of_band(design: &Design, shots: u64) -> u64 {
     if design.scan.is_one_flash() {
         return design.shots_per_scan();
@@ -176,8 +177,8 @@ fn with_guard(design: &Design, owned: Range<u64>) -> Range<u64> {
     let cut = design.cut();
     let fired_fs = cut.shots(fired(owned.start), fired(owned.end - 1));
     let (opens, closes) = fired_fs.into_inner();
-    // As many as are fired in that time on average, and then one by one: a resonant mirror is
-    // faster in the middle of a line, and slower at its ends.
+    // The mean number of shots in that time comes first, and then single shots: a resonant mirror is faster
+    // in the middle of a line, and slower at its ends.
     let mean = (cut.history_fs as f64 * per_scan as f64 / (design.scan_period() * 1e15)) as u64;
     let (mut first, mut end) = (owned.start.saturating_sub(mean), owned.end + mean);
     while first > 0 && fired(first - 1) >= opens {

@@ -1,8 +1,8 @@
 //! The shots of a lidar that runs by a clock of its own.
 //!
-//! Its scans repeat without end, before its clock reads 0 as well as after. 1000 s of its clock
-//! hold a whole number of scans, so that a shot of any age is one of the first 1000 s, moved by a
-//! multiple of them. Both clocks are whole numbers of femtoseconds; conversion rounds down.
+//! Its scans repeat without end, before its clock reads 0 as well as after. 1000 s of its clock hold a whole
+//! number of scans. So a shot of any age is one of the first 1000 s, moved by a multiple of them. Both clocks
+//! are whole numbers of femtoseconds; conversion rounds down.
 
 use std::ops::Range;
 
@@ -36,7 +36,7 @@ impl Clock {
         (its_fs * WHOLE).div_euclid(WHOLE + i128::from(self.drift)) + i128::from(self.phase_fs)
     }
 
-    /// What it reads at our time `ours_fs`, fs.
+    /// Returns its reading at our time `ours_fs`, fs.
     fn its(&self, ours_fs: i64) -> i128 {
         let passed = i128::from(ours_fs) - i128::from(self.phase_fs);
         (passed * (WHOLE + i128::from(self.drift))).div_euclid(WHOLE)

@@ -1,4 +1,4 @@
-//! What leaves the sensor: which pixel when, with which code, in which direction.
+//! The light that leaves the sensor: its pixel, time, code and direction.
 
 mod band;
 mod clock;

@@ -9,7 +9,7 @@ use crate::design::Design;
 /// Longest run in s: absolute time is an `i64` of femtoseconds, which ends after 9223 s.
 const LONGEST_RUN: f64 = 9000.0;
 
-/// What the sensor sends to one pixel, and when.
+/// A shot to one pixel: its time, and the label and the word that it carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shot {
     /// Absolute time at which the first chip leaves, fs.

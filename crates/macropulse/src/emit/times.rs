@@ -16,16 +16,16 @@ pub(super) fn fired_at_fs(design: &Design, scan: u64, order: u64) -> i64 {
 /// The times of consecutive shots, where all of them are equally far apart: those of
 /// [`fired_at_fs`] without a division for each.
 pub(super) struct EqualSteps {
-    /// So many runs, each of every fourth shot, are counted on side by side: the time of a shot has to wait
-    /// for that of the one before it in its run.
+    /// Runs of every fourth shot, counted on side by side: the time of a shot has to wait for that of the one
+    /// before it in its run.
     runs: [Run; SIDE_BY_SIDE],
 }
 
 /// Runs of shots: with four, the log of a scan takes four fifths of the time that it takes with one.
 const SIDE_BY_SIDE: usize = 4;
 
-/// The time of a shot: a whole number of femtoseconds and a rest, counted in parts of one. So many shots
-/// later both have grown by the same.
+/// The time of a shot: a whole number of femtoseconds and a rest, counted in parts of one. [`SIDE_BY_SIDE`]
+/// shots later both have grown by the same.
 struct Run {
     fs: i64,
     rest: u64,
@@ -44,7 +44,7 @@ impl EqualSteps {
         design.scan.model().equal_steps().then(|| Self { runs: std::array::from_fn(run) })
     }
 
-    /// The times of as many shots as there are places in `fired_at_fs`.
+    /// Fills in the times of consecutive shots, one for each place of `fired_at_fs`.
     pub(super) fn fill(mut self, fired_at_fs: &mut [i64]) {
         let (whole, rest) = fired_at_fs.as_chunks_mut::<SIDE_BY_SIDE>();
         whole.iter_mut().for_each(|places| *places = self.runs.each_mut().map(Run::next));
@@ -53,7 +53,7 @@ impl EqualSteps {
 }
 
 impl Run {
-    /// Every so many shots from number `first` on.
+    /// Returns the run of every [`SIDE_BY_SIDE`]-th shot from number `first` on.
     fn new(design: &Design, first: u64) -> Self {
         let (parts, chip_fs) = (parts_of_fs(design), design.emission.grid_fs());
         let whole = |shots: u64| (u128::from(shots) * NUMERATOR / parts) as i64;
@@ -86,7 +86,7 @@ impl Run {
 /// Femtoseconds in 1000 s, the time in which scans are counted.
 const NUMERATOR: u128 = FS_PER_S as u128 * 1000;
 
-/// What times of shots are whole numbers of, per femtosecond.
+/// Returns the parts in a femtosecond: times of shots are whole numbers of parts.
 fn parts_of_fs(design: &Design) -> u128 {
     u128::from(design.shots_per_scan()) * u128::from(design.scan.rate_millihertz)
 }

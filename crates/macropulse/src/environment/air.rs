@@ -1,4 +1,4 @@
-//! What air and rain take of light on its way.
+//! The loss of light in air and rain on its way, and the light that they send back.
 
 /// Natural extinction, 1/m, of one decibel per kilometre.
 const DB_PER_KM: f64 = std::f64::consts::LN_10 / 10.0 * 1e-3;
@@ -36,14 +36,14 @@ const DROPS: f64 = 18.8;
 /// Extinction over backscatter of haze, sr: between that over the sea and that of a city \[Mul07\].
 const HAZE: f64 = 50.0;
 
-/// What a unit of volume of air of this `visibility`, m, in rain of `mm_per_hour` sends back,
-/// 1/(m·sr), at a `wavelength` in m.
+/// Returns the backscatter of a unit of volume, 1/(m·sr), for air of this `visibility`, m, in rain of
+/// `mm_per_hour`, at a `wavelength` in m.
 pub fn backscatter(visibility: f64, mm_per_hour: f64, wavelength: f64) -> f64 {
     let ratio = if is_fog(visibility) { DROPS } else { HAZE };
     haze(visibility, wavelength) / ratio + rain(mm_per_hour) / DROPS
 }
 
-/// Whether air of this `visibility`, m, is fog.
+/// Returns true if air of this `visibility`, m, is fog.
 pub fn is_fog(visibility: f64) -> bool {
     visibility < 1e3
 }

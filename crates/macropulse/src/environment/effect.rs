@@ -27,7 +27,7 @@ impl Effect {
         }
     }
 
-    /// What is assumed when it is left out.
+    /// Returns the assumption that stands for it when it is left out.
     pub fn assumption(self) -> &'static str {
         match self {
             Self::Atmosphere => "the air is perfectly clear",

@@ -86,8 +86,8 @@ pub(super) fn read(typed: &Value) -> Result<Environment, Error> {
     }
 }
 
-/// What is typed for an environment, if anything, after the change of one key: empty for the whole
-/// of it, [`WITH`] and [`WITHOUT`] for an effect, else a key of it.
+/// Returns the value of an environment after the change of one key; `typed` is the value before, if there is
+/// one. The key is empty for the whole of it, [`WITH`] and [`WITHOUT`] for an effect, else a key of it.
 ///
 /// # Errors
 /// If the environment is unknown, or the effect.

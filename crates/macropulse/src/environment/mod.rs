@@ -1,7 +1,7 @@
 //! The surroundings of a scene: sun, air, rain and fog.
 //!
-//! They belong to the place, not to the sensor: two sensors in one scene have the same weather.
-//! An environment is plain data. What a sensor makes of it is worked out by
+//! They belong to the place, not to the sensor: two sensors in one scene have the same weather. An
+//! environment is plain data. Its effects on a sensor are worked out by
 //! [`Operating`](crate::channel::Operating).
 
 mod air;
@@ -23,12 +23,12 @@ pub use schema::schema;
 /// The environment of a scene that names none.
 pub const DEFAULT: &str = "clear-day";
 
-/// Sine of the elevation under which the sun shines square on the ground as it does on the surface
-/// of the table: cos 11.19°, the angle of the sun of air mass 1.5, 41.81° high, to the normal of a
-/// surface that is tilted by 37° \[G173\].
+/// Sine of the elevation at which the sun lights level ground as it lights the surface of the table:
+/// cos 11.19°. This is the angle between the sun of air mass 1.5, 41.81° high, and the normal of a surface
+/// that is tilted by 37° \[G173\].
 const SQUARE_ON_TABLE: f64 = 0.980_989;
 
-/// What is left of sunlight on the ground under closed clouds: 1 − 0.75 \[KC80\].
+/// Share of sunlight that is left on the ground under closed clouds: 1 − 0.75 \[KC80\].
 const BELOW_CLOUDS: f64 = 0.25;
 
 /// Sun, air, rain and fog.
@@ -65,7 +65,7 @@ pub enum Sunlight {
     Declared(f64),
 }
 
-/// What is wrong with an environment: the key, and what to do.
+/// A fault in an environment: the key, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("environment{}{key}: {message}", if key.is_empty() { "" } else { "." })]
 pub struct Error {
@@ -136,7 +136,7 @@ impl Environment {
         }
     }
 
-    /// Whether `effect` is left out.
+    /// Returns true if `effect` is left out.
     pub fn is_off(&self, effect: Effect) -> bool {
         self.idealised.contains(&effect)
     }
@@ -159,7 +159,7 @@ impl Environment {
         }
     }
 
-    /// Whether there is fog or rain.
+    /// Returns true if there is fog or rain.
     pub fn has_drops(&self) -> bool {
         let drops = air::is_fog(self.visibility) || self.rain_mm_h > 0.0;
         drops && !self.is_off(Effect::Atmosphere)
@@ -168,9 +168,10 @@ impl Environment {
     /// Spectral irradiance of the scene at a `wavelength` in m, W/m² per metre of wavelength; `None`
     /// where the table of sunlight does not go.
     ///
-    /// By day that of a surface tilted towards the sun, E \[G173\]; on level ground with the sun at
-    /// an elevation h, E·sin h / cos 11.19°, all of the light taken as direct and the air it comes
-    /// through as that of the table, which is too bright for a low sun; under closed clouds E/4.
+    /// By day this is the irradiance of a surface tilted towards the sun, E \[G173\]. On level ground with
+    /// the sun at an elevation h it is E·sin h / cos 11.19°. All of the light is taken as direct then, and
+    /// the air it comes through as that of the table, which is too bright for a low sun. Under closed clouds
+    /// it is E/4.
     pub fn irradiance(&self, wavelength: f64) -> Option<f64> {
         match self.sunlight {
             _ if self.is_off(Effect::Background) => Some(0.0),
@@ -185,7 +186,7 @@ impl Environment {
         }
     }
 
-    /// What it is like, for people to read.
+    /// Returns its description, for people to read.
     pub fn conditions(&self) -> String {
         let sky = match self.sunlight {
             _ if self.is_off(Effect::Background) => "no sunlight".to_owned(),

@@ -15,7 +15,7 @@ pub fn schema() -> Value {
     schema::of::<Typed>("Macropulse environment").to_value()
 }
 
-/// What stands for an environment in a scene: the name of a ready one, or its keys.
+/// An environment in a scene: the name of a ready one, or its keys.
 pub(crate) fn in_scene(generator: &mut SchemaGenerator) -> Schema {
     let mut either = Schema::default();
     let choices = [ready_name(generator), generator.subschema_for::<Typed>()];

@@ -1,5 +1,5 @@
-//! What a file says of a cloud as a whole, as lines of text: for the comments of PLY and PCD, and for
-//! whatever else takes text.
+//! The lines of text that a file has about a cloud as a whole: for the comments of PLY and PCD, and for other
+//! formats that take text.
 
 use super::{CloudRoom, LeftOut, Names};
 use crate::points::{NO_OBJECT, Pick, PointCloud, Viewpoint};
@@ -16,7 +16,7 @@ const VIEWPOINT: &str = "macropulse viewpoint ";
 /// Begins the line with the stamp of the scan, ns of Unix time.
 const STAMP: &str = "macropulse stamp ";
 
-/// What a file says of its cloud beside the points.
+/// The facts that a file tells of its cloud beside the points.
 #[derive(Debug, Default)]
 pub(super) struct About {
     pub scan: u64,
@@ -26,11 +26,11 @@ pub(super) struct About {
     pub list: Option<List>,
     pub objects: Vec<String>,
     pub materials: Vec<String>,
-    /// What of the file is not in its clouds.
+    /// The parts of the file that are not in its clouds.
     pub left_out: LeftOut,
     /// The memory that a cloud may take.
     pub room: CloudRoom,
-    /// Whether the file is a driver's, which writes (0, 0, 0) where nothing returned.
+    /// True if the file is a driver's, which writes (0, 0, 0) where nothing returned.
     pub is_of_driver: bool,
 }
 
@@ -89,7 +89,7 @@ pub(super) fn all_lines<'a>(
 }
 
 impl About {
-    /// Of a file whose cloud may take the memory of `room`.
+    /// Creates the facts of a file whose cloud may take the memory of `room`.
     pub fn within(room: CloudRoom) -> Self {
         Self { room, ..Self::default() }
     }

@@ -26,7 +26,7 @@ pub struct WholeFile {
     out: BufWriter<Sink>,
 }
 
-/// Where the bytes of a file go until it is whole.
+/// The place for the bytes of a file until it is whole.
 #[derive(Debug)]
 enum Sink {
     Temporary(NamedTempFile),

@@ -1,4 +1,4 @@
-//! What is written of each point, by the table of attributes.
+//! The attributes that are written of each point, by the table of attributes.
 
 use super::Error;
 use super::number::Kind;
@@ -8,7 +8,7 @@ use crate::points::{Extent, Field, Outcome, PointCloud, Storage, angle};
 /// Rows or columns that 16 bits can number.
 const MOST_ROWS: usize = 1 << 16;
 
-/// What is written as a point.
+/// An entry of a cloud that is written as a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Point {
     /// The return at this place of the list.
@@ -28,7 +28,7 @@ pub(super) enum Value {
 }
 
 impl Attribute {
-    /// What is written of `cloud`: the attributes that it has, the truth at the end.
+    /// Returns the attributes that are written of `cloud`: those that it has, the truth at the end.
     pub(super) fn of(cloud: &PointCloud) -> Vec<Self> {
         Self::in_files().filter(|attribute| attribute.is_in(cloud)).collect()
     }
@@ -40,7 +40,7 @@ impl Attribute {
         if is_told { name.to_owned() } else { format!("{name}_{unit}") }
     }
 
-    /// What its values in `cloud` are stored as.
+    /// Returns the type in which its values in `cloud` are stored.
     pub(super) fn kind(self, cloud: &PointCloud) -> Kind {
         match self.storage() {
             Storage::Length(_, exact) if !exact.of(cloud).is_empty() => Kind::F8,
@@ -94,7 +94,7 @@ fn entry<T: Copy>(field: &Field<T>, cloud: &PointCloud, point: Point) -> T {
 }
 
 impl Value {
-    /// What it is stored as.
+    /// Returns the type in which it is stored.
     #[cfg(test)]
     pub fn kind(self) -> Kind {
         match self {
@@ -153,7 +153,7 @@ pub(super) fn outcome_from_code(code: u8) -> Option<Outcome> {
 }
 
 /// Refuses a cloud with a column that is not empty and has not one entry per return or pixel, or with too
-/// many pixels to number: after this, indexing the columns that the cloud has is safe.
+/// many pixels to number. After this, indexing the columns that the cloud has is safe.
 pub(super) fn check_even(cloud: &PointCloud) -> Result<(), Error> {
     let (rows, columns) = (cloud.rows, cloud.columns);
     if rows.max(columns) > MOST_ROWS {

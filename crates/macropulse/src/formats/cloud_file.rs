@@ -170,7 +170,7 @@ impl CloudFile {
         Ok(true)
     }
 
-    /// Whether nothing but white space follows. What was read is read again.
+    /// Returns true if nothing but white space follows. The file then stands where it stood before.
     ///
     /// # Errors
     /// If the file cannot be read.

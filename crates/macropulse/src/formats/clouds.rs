@@ -35,7 +35,7 @@ enum Source {
     Messages(Box<Messages>),
 }
 
-/// What a file is read as.
+/// The format in which a file is read.
 #[derive(Clone, Copy, PartialEq)]
 enum FileKind {
     /// A format that is written, too.
@@ -45,7 +45,7 @@ enum FileKind {
 }
 
 impl FileKind {
-    /// What the file at `path` is read as, by its ending.
+    /// Returns the kind of the file at `path`, by its ending.
     fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?;
         match ending.to_ascii_lowercase().as_str() {
@@ -102,7 +102,7 @@ impl Clouds {
         Ok(Self { path: path.to_owned(), kind, source, next: 0 })
     }
 
-    /// Whether the file may hold several clouds.
+    /// Returns true if the file may hold several clouds.
     pub fn has_several(&self) -> bool {
         match &self.source {
             Source::One { .. } => false,
@@ -119,7 +119,7 @@ impl Clouds {
         }
     }
 
-    /// What of the file, as far as it was read, is not in its clouds.
+    /// Returns the parts of the file, as far as it was read, that are not in its clouds.
     pub fn left_out(&self) -> &LeftOut {
         &self.about().left_out
     }

@@ -7,17 +7,17 @@ thread_local! {
     static IS_CONTAINED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether this thread calls a library that may panic where a file is damaged, which is then told as an
-/// error: a panic hook need not tell it.
+/// Returns true if this thread calls a library that may panic where a file is damaged. The panic is then told
+/// as an error, so a panic hook need not tell it.
 pub fn is_contained() -> bool {
     IS_CONTAINED.get()
 }
 
-/// What `read` gives.
+/// Returns the result of `read`.
 ///
-/// The decoders of LAZ and MCAP that we use check most of what a file says, but not all: an arithmetic
-/// code may name a symbol that there is not, a record may be longer than the chunk that it is in. They
-/// panic then. Whatever `read` has changed must not be used afterwards.
+/// The decoders of LAZ and MCAP that we use check most of what a file says, but not all. An arithmetic code
+/// may name a symbol that there is not, or a record may be longer than the chunk that it is in. They panic
+/// then. Whatever `read` has changed must not be used afterwards.
 ///
 /// # Errors
 /// If it panics: that the data is damaged.

@@ -6,8 +6,8 @@ use crate::points::{NO_OBJECT, PointCloud};
 use std::borrow::Cow;
 use std::io::{self, Write};
 
-/// Writes the returns of a cloud whose columns are even. Numbers have as many digits as it takes
-/// to read the same number back.
+/// Writes the returns of a cloud whose columns are even. Numbers have the digits that it takes to read the
+/// same number back.
 pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
     let attributes = &Attribute::of(cloud);
     let header: Vec<_> = attributes.iter().map(|attribute| attribute.name_with_unit()).collect();

@@ -11,7 +11,7 @@ use crate::points::{NO_OBJECT, Outcome, PointCloud};
 use ::csv::{ReaderBuilder, StringRecord};
 use std::io::Read;
 
-/// What the columns hold where no line names them. Further columns are not known.
+/// The meaning of the columns if no line names them. Further columns are not known.
 const WITHOUT_HEADINGS: [Attribute; 4] =
     [Attribute::X, Attribute::Y, Attribute::Z, Attribute::Intensity];
 
@@ -70,7 +70,7 @@ impl Separator {
     }
 }
 
-/// Where the points or their headings begin.
+/// The place in a text at which the points or their headings begin.
 struct Sheet {
     /// Lines before that.
     before: usize,
@@ -180,7 +180,7 @@ impl Sheet {
     }
 }
 
-/// Whether these headings name all three coordinates.
+/// Returns true if these headings name all three coordinates.
 fn has_coordinates<'a>(headings: impl Iterator<Item = &'a str>) -> bool {
     let known = headings.filter_map(|heading| Meaning::of_heading(heading, None));
     check_coordinates(&known.map(|meaning| meaning.attribute).collect::<Vec<_>>()).is_ok()
@@ -197,7 +197,8 @@ struct Points {
 }
 
 impl Points {
-    /// With the columns that the cells of the first line name, or as many as it has.
+    /// Creates points with the columns that the cells of the first line name, or without headings with one
+    /// column per cell.
     fn new<'a>(
         first: impl Iterator<Item = &'a str>,
         sheet: &Sheet,

@@ -61,8 +61,8 @@ pub(super) fn encode(cloud: &PointCloud, names: &Names) -> e57::Result<Vec<u8>> 
     Ok(file.into_inner())
 }
 
-/// A text that does not end the section of character data (CDATA) that it is written into: where it would,
-/// it goes on in a second one, and readers join both.
+/// Returns a `text` that does not end the section of character data (CDATA) that it is written into. At a
+/// mark that would end it, the text goes on in a second section, and readers join both.
 fn unclosed(text: &str) -> String {
     text.replace("]]>", "]]]]><![CDATA[>")
 }

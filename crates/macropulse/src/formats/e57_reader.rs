@@ -60,7 +60,7 @@ impl Scans for E57Scans {
     }
 }
 
-/// What went wrong in the library, in our words.
+/// Returns an error of the library in our words.
 fn told(error: &::e57::Error) -> String {
     match error {
         ::e57::Error::NotImplemented { .. } => "it has parts of E57 that are not read".to_owned(),
@@ -127,7 +127,7 @@ fn check_size(prototype: &[Record], records: u64, size: u64) -> Result<(), Strin
     Ok(())
 }
 
-/// What a value of a point is for.
+/// The purpose of a value of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meaning {
     /// An attribute of ours.
@@ -140,7 +140,7 @@ enum Meaning {
     Unknown(Attribute),
 }
 
-/// What the values of a scan's points are.
+/// The meanings of the values of a scan's points.
 struct Columns {
     each: Vec<(Option<Meaning>, RecordDataType)>,
     is_spherical: bool,

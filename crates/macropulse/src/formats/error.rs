@@ -1,4 +1,4 @@
-//! What can go wrong with a file, and whose fault it is.
+//! The errors of reading and writing a file, and whose fault each is.
 
 use super::Format;
 use crate::told;
@@ -14,7 +14,7 @@ pub enum Error {
     Write {
         /// The file that was wanted.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         cause: io::Error,
     },
     /// The world would not give the file.
@@ -22,7 +22,7 @@ pub enum Error {
     Read {
         /// The file that was wanted.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         cause: io::Error,
     },
     /// The file is not what its name promises.
@@ -32,7 +32,7 @@ pub enum Error {
         path: PathBuf,
         /// Name of the format it was read as.
         format: &'static str,
-        /// What is wrong, where, and what would be right.
+        /// The fault, its place, and what would be right.
         fault: String,
     },
     /// The caller's cloud is not rectangular.
@@ -46,7 +46,7 @@ pub enum Error {
         found: usize,
         /// Entries it should have.
         needed: usize,
-        /// Of what it should have one each: returns or pixels.
+        /// The things that should have one entry each: returns or pixels.
         of: &'static str,
     },
     /// The caller's cloud has more rows or columns than files can number.
@@ -93,7 +93,7 @@ impl Error {
         Self::Read { path: path.to_owned(), cause }
     }
 
-    /// What is wrong in one line, whatever a name in the file holds.
+    /// Returns an error with the fault in one line, whatever a name in the file holds.
     pub(super) fn invalid(path: &Path, format: &'static str, fault: impl Into<String>) -> Self {
         let fault = fault.into().replace(char::is_control, " ");
         Self::Invalid { path: path.to_owned(), format, fault }

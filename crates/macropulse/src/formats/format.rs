@@ -88,7 +88,7 @@ impl Format {
         }
     }
 
-    /// What the names of its files end in, after the dot: the program that opens a file goes by it,
+    /// Returns the ending of the names of its files, after the dot. The program that opens a file goes by it,
     /// so formats may share one.
     pub fn extension(self) -> &'static str {
         match self {
@@ -111,7 +111,7 @@ impl Format {
         }
     }
 
-    /// Whether all scans of a run go into one file.
+    /// Returns true if all scans of a run go into one file.
     pub fn is_of_run(self) -> bool {
         matches!(self, Self::Mcap(_))
     }

@@ -30,7 +30,7 @@ const ALIASES: &[(Attribute, &[&str])] = &[
 /// Names of times that have a unit of their own, and the ns of that unit.
 const TIMES: [(&str, f64); 3] = [("offset_time", 1.0), ("t_ns", 1.0), ("adjustedtime", 1e3)];
 
-/// What a column holds.
+/// The meaning of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Meaning {
     pub attribute: Attribute,
@@ -57,7 +57,7 @@ impl Meaning {
         Self { attribute, unit: Unit::Times(factor) }
     }
 
-    /// Whether the stored number is in our unit.
+    /// Returns true if the stored number is in our unit.
     pub fn is_as_stored(self) -> bool {
         self.unit == Unit::Times(1.0)
     }
@@ -70,7 +70,7 @@ impl Meaning {
         }
     }
 
-    /// What the column with this heading holds, whose numbers are of this kind if that is known.
+    /// Returns the meaning of the column with this heading. Its numbers are of this `kind`, if that is known.
     ///
     /// Case does not count. A unit may follow in brackets, behind a slash or behind `_`.
     pub fn of_heading(heading: &str, kind: Option<Kind>) -> Option<Self> {
@@ -112,8 +112,8 @@ impl Meaning {
     }
 }
 
-/// Nanoseconds of the unit that a time of this size must be in: seconds since 1970 stay below 10¹¹ for
-/// 3000 years, and a time since 1970 in ms, µs or ns is above 10¹¹, 10¹⁴ or 10¹⁷.
+/// Returns the nanoseconds of the unit of a time of this size. Seconds since 1970 stay below 10¹¹ for 3000
+/// years. A time since 1970 in ms, µs or ns is above 10¹¹, 10¹⁴ or 10¹⁷.
 fn clock(stored: f64) -> f64 {
     match stored.abs() {
         size if size >= 1e17 => 1.0,

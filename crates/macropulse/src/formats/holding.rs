@@ -17,7 +17,7 @@ pub(super) enum Holding {
     Not,
 }
 
-/// What a file may hold beside the attributes of its points.
+/// Contents of a file beside the attributes of its points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Further {
     /// Pixels without a return.
@@ -59,7 +59,7 @@ impl Further {
 }
 
 impl Format {
-    /// What of `cloud` and its `names` is left out when it is written in this format, in words.
+    /// Lists, in words, the parts of `cloud` and its `names` that this format leaves out.
     pub fn leaves_out(self, cloud: &PointCloud, names: &Names) -> Vec<&'static str> {
         let left_out = |attribute: &Attribute| self.holds(*attribute) == Holding::Not;
         let attributes = Attribute::of(cloud).into_iter().filter(left_out);
@@ -120,7 +120,7 @@ impl Format {
         }
     }
 
-    /// Whether it holds what is no attribute of a point.
+    /// Returns true if this format holds `further`, which is no attribute of a point.
     pub(super) fn holds_further(self, further: Further) -> bool {
         use Further::{Digits, EmptyPixels, Names, Pose, Stamp};
         match self {

@@ -11,7 +11,7 @@ use crate::points::PointCloud;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// What a point has.
+/// Attributes of a point.
 pub(super) const ATTRIBUTES: [Attribute; 4] =
     [Attribute::X, Attribute::Y, Attribute::Z, Attribute::Intensity];
 
@@ -66,7 +66,7 @@ impl Floats {
         self.attributes().len() * Kind::F4.size()
     }
 
-    /// Whether the bytes look like points of this number of floats: coordinates on Earth, no negative
+    /// Returns true if the bytes look like points of this number of floats: coordinates on Earth, no negative
     /// intensity, and rings that are small whole numbers.
     fn fit(self, file: &mut CloudFile) -> Result<bool, String> {
         if !file.length().is_multiple_of(self.stride() as u64) {

@@ -15,11 +15,11 @@ const STEP: f64 = 1e-6;
 /// Steps that coordinates with more digits may have, m: the coarsest that keeps all of them counts.
 const STEPS: [f64; 8] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
-/// Share of a step by which a coordinate may be beside it, and lies on it: what remains of sums of
-/// 64-bit floats.
+/// Share of a step by which a coordinate may be beside it and still counts as on it: the rounding error of
+/// sums of 64-bit floats.
 const BESIDE: f64 = 1e-3;
 
-/// What an apparent reflectance of 1 is as an intensity: the 16 bits end at 6.5535.
+/// Intensity that stands for an apparent reflectance of 1: the 16 bits end at 6.5535.
 pub(super) const WHITE: f64 = 10_000.0;
 
 /// Whose records are the descriptions of extra bytes, and their number.

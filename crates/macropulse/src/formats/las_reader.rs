@@ -91,7 +91,7 @@ const UNREAD: [&str; 13] = [
 /// Which of [`UNREAD`] say something of any point.
 struct Unread {
     seen: [bool; UNREAD.len()],
-    /// Whether the file is ours, where the user's data is the row.
+    /// True if the file is ours: then the user data is the row.
     is_ours: bool,
 }
 
@@ -207,13 +207,13 @@ fn check_sizes(file: &mut CloudFile) -> Result<(), String> {
 fn check_layers(file: &mut CloudFile, header: &Header) -> Result<(), String> {
     let fault = || "its compressed points are damaged".to_owned();
     let Ok(vlr) = header.laz_vlr() else { return Ok(()) };
-    // What is compressed must be the points of the header: of longer ones there were more layers.
+    // The compressed points must be those of the header: longer ones would have more layers.
     if vlr.items_size() != u64::from(header.point_format().len()) {
         return Err(fault());
     }
     let begin = number(file, 96, Kind::U4)?.ok_or_else(fault)?;
     let table = number(file, begin, Kind::U8)?.ok_or_else(fault)?;
-    // Where the file was written as a stream, the place of the table is at the end.
+    // A file that was written as a stream has the place of the table at its end.
     let end = file.length();
     let table = if table > begin && table < end {
         table
@@ -299,14 +299,16 @@ fn extra(header: &Header, left_out: &mut LeftOut) -> Vec<Extra> {
     found
 }
 
-/// What extra bytes of another program hold. For coordinates, times and returns LAS has fields.
+/// Meaning of extra bytes of another program. Coordinates, times and returns are none: LAS has fields for
+/// them.
 fn of_others(name: &str, kind: Kind) -> Option<Meaning> {
     use Attribute::{Column, Intensity, Range, Ring, Row};
     let meaning = Meaning::of_heading(name, Some(kind));
     meaning.filter(|known| matches!(known.attribute, Intensity | Range | Row | Column | Ring))
 }
 
-/// What the points of a file have. Fields that LAS always has are told apart by [`forget_blank`].
+/// Attributes of the points of a file. [`forget_blank`] drops the fields that LAS always has and this file
+/// leaves blank.
 fn attributes(extra: &[Extra]) -> Vec<Attribute> {
     let always = [Attribute::Intensity, Attribute::ReturnNumber, Attribute::NumberOfReturns];
     let extra = extra.iter().map(|extra| extra.meaning.attribute);

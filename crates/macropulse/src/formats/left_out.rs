@@ -1,4 +1,4 @@
-//! What a reader leaves out of a file, so that nothing is lost without a word.
+//! Contents of a file that its reader leaves out: a list, so that nothing is lost without a word.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -6,7 +6,7 @@ use std::fmt;
 /// Names of fields that a sentence lists at most.
 const MOST_NAMES: usize = 24;
 
-/// What of a file is not in its clouds. The message, of its `Display`, is a list in words.
+/// Contents of a file that are not in its clouds. `Display` lists them in words.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct LeftOut {
     /// Fields of points that a cloud has no column for, by their names in the file: colours and
@@ -43,12 +43,12 @@ impl NoPoint {
 }
 
 impl LeftOut {
-    /// Whether nothing is left out.
+    /// Returns true if nothing is left out.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Whether `other` leaves out the same, but for the number of points.
+    /// Returns true if `other` leaves out the same, but for the number of points.
     pub fn is_alike(&self, other: &Self) -> bool {
         self.fields == other.fields
             && self.reference_system == other.reference_system

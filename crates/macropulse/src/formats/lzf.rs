@@ -1,9 +1,9 @@
-//! LZF, by which the points of compressed PCD files are packed.
+//! LZF, the compression of points in compressed PCD files.
 //!
-//! A stream is a list of runs of bytes as they are and of copies of what was unpacked before. The first
-//! byte of a run below 32 is its length less 1. Else its upper three bits are the length of a copy less
-//! 2, where 7 adds a byte to the length; the other five bits and the next byte are how far back the
-//! copy begins, less 1.
+//! A stream is a list of runs of literal bytes and of copies of bytes that were unpacked before. A first byte
+//! below 32 begins a run: it is the length of the run less 1. Any other first byte begins a copy. Its upper
+//! three bits are the length of the copy less 2; if they are 7, the next byte is added to the length. Its
+//! lower five bits and the byte behind are the distance back to the start of the copy, less 1.
 
 /// Bytes that one packed byte unpacks to at most: 3 bytes make a copy of 264.
 pub(super) const MOST_EXPANSION: usize = 88;

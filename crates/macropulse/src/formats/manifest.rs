@@ -1,4 +1,4 @@
-//! What a run says of itself: `manifest.json`.
+//! The description of a run: `manifest.json`.
 
 use super::{Error, write_atomically};
 use serde::ser::{Serialize, Serializer};
@@ -53,7 +53,7 @@ pub struct Named {
 pub struct Surroundings {
     /// Name of the environment.
     pub name: String,
-    /// What it is like, in words.
+    /// Its conditions, in words.
     pub conditions: String,
 }
 
@@ -89,7 +89,7 @@ pub struct Begun {
     pub roll_deg: f64,
 }
 
-/// What is needed to repeat a run and to judge it. The fields are written in this order.
+/// Everything that is needed to repeat a run and to judge it. The fields are written in this order.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Manifest {
     /// Version of these keys, [`SCHEMA_VERSION`].
@@ -112,9 +112,9 @@ pub struct Manifest {
     pub idealised: Vec<String>,
     /// Effects that no run models, by name: what is assumed instead, and how large each would be.
     pub not_modelled: Entries<serde_json::Value>,
-    /// What was assumed in reading the scene.
+    /// Assumptions made in reading the scene.
     pub assumed: Vec<String>,
-    /// What a reader should be warned of.
+    /// Warnings to the reader.
     pub warnings: Vec<String>,
     /// Counts from stage to stage: shots, echoes, detection events, ticks, returns.
     pub counts: Entries<u64>,

@@ -59,8 +59,7 @@ pub use room::CloudRoom;
 use crate::points::PointCloud;
 use std::path::Path;
 
-/// What the object and material numbers of a scene are called. Numbers without a name are written
-/// as numbers.
+/// Names of the object and material numbers of a scene. Numbers without a name are written as numbers.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Names<'a> {
     /// Names of the scene's objects, by number.
@@ -73,8 +72,9 @@ pub struct Names<'a> {
 /// format with all scans of a run in one file has this one alone; see [`Recording`].
 ///
 /// # Errors
-/// [`Error::Uneven`] if a column of the cloud has not one entry per return or pixel, [`Error::TooLarge`] if it
-/// has too many pixels to number, [`Error::Write`] if the file cannot be written; then an older file of that name is untouched.
+/// [`Error::Uneven`] if a column of the cloud has not one entry per return or pixel, and [`Error::TooLarge`]
+/// if it has too many pixels to number. [`Error::Write`] if the file cannot be written; an older file of that
+/// name is then untouched.
 pub fn write_cloud(
     format: Format,
     cloud: &PointCloud,
@@ -109,8 +109,8 @@ fn write_even(
     }
 }
 
-/// Writes the returns of `cloud` as lines of [`Format::Csv`], for a stream of parts of which only the
-/// first has the line of names before it.
+/// Writes the returns of `cloud` as lines of [`Format::Csv`], for a stream of parts: only the first part has
+/// the line of names before it.
 ///
 /// # Errors
 /// If `out` cannot be written to.

@@ -9,7 +9,7 @@ use super::{CloudRoom, interleave};
 use crate::points::PointCloud;
 use std::io::{self, Write};
 
-/// What every file begins with, before the version.
+/// Bytes at the beginning of every file, before the version.
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// Writes the returns of a cloud whose columns are even, as one structured array.
@@ -31,8 +31,8 @@ pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes the range image of a cloud whose columns are even: rows × columns, m, NaN where there is no
-/// return; of each pixel the return picked.
+/// Writes the range image of a cloud whose columns are even: rows × columns, m. A pixel has the range of its
+/// picked return, or NaN if it has no return.
 pub(super) fn write_range(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
     if cloud.rows * cloud.columns == 0 {
         return Err(io::Error::other("an image needs at least one row and one column"));
@@ -61,8 +61,8 @@ fn write_header(descr: &str, shape: &str, out: &mut dyn Write) -> io::Result<()>
     writeln!(out, "{text:width$}", width = length - 1)
 }
 
-/// The cloud of an array: of a structured one with fields x, y and z, or of a plain one with a line per
-/// point, of which the columns are x, y, z and intensity.
+/// Reads the cloud of an array: a structured one with fields x, y and z, or a plain one with a line per
+/// point. The columns of a plain one are x, y, z and intensity.
 pub(super) fn parse(file: &mut CloudFile, room: CloudRoom) -> Result<(PointCloud, About), String> {
     let header = header(file)?;
     let mut about = About::within(room);
@@ -177,8 +177,8 @@ fn fields(header: &str) -> Result<(Vec<Stored<'_>>, usize), String> {
 /// Columns of a plain array; the last two are no attribute. More are rather an image.
 const PLAIN: [&str; 6] = ["x", "y", "z", "intensity", "column 5", "column 6"];
 
-/// Whether the numbers of the first column come first, then those of the second. In a list of structures
-/// the order is the same either way.
+/// Returns true if the numbers of the first column come first, then those of the second. In a list of
+/// structures the order is the same either way.
 fn is_by_columns(header: &str, fields: &[Stored]) -> bool {
     let order = header.split_once("'fortran_order':");
     let is_by_columns = order.is_some_and(|(_, rest)| rest.trim_start().starts_with("True"));
@@ -196,7 +196,7 @@ fn by_columns(
 ) -> Result<Vec<u8>, String> {
     let stride: usize = sizes.iter().sum();
     let size = points.saturating_mul(stride) as u64;
-    // What is read, and the same point by point.
+    // The bytes as read, and the same bytes point by point.
     room.check_beside(size.saturating_mul(2), points as u64)?;
     let whole = file.rest() / stride.max(1) as u64;
     let columns = file.bytes(size)?.ok_or_else(|| table::cut_short(whole, points as u64))?;

@@ -43,7 +43,7 @@ impl Kind {
         }
     }
 
-    /// Whether it is a kind of whole numbers.
+    /// Returns true for kinds of whole numbers.
     pub fn is_whole(self) -> bool {
         !matches!(self, Self::F4 | Self::F8)
     }

@@ -25,8 +25,8 @@ const TAIL: u64 = 1 << 16;
 /// Most bytes of a manifest or a page that is searched for names.
 const LONGEST: u64 = 256 << 20;
 
-/// The files of one folder that Macropulse wrote: those that its manifest or page names, those that carry
-/// its mark, and beside a manifest those that are named as scans are.
+/// The files of one folder that Macropulse wrote. These are the files that its manifest or page names and
+/// those that carry its mark. Beside a manifest, files that are named like scans are ours, too.
 #[derive(Debug, Clone, Default)]
 pub struct Own {
     manifest: Option<String>,
@@ -44,7 +44,7 @@ impl Own {
         Self { manifest: text("manifest.json"), page: text("index.html") }
     }
 
-    /// Whether the file at `path`, in this folder, is one of ours. A link is not.
+    /// Returns true if the file at `path`, in this folder, is one of ours. A link is not.
     pub fn has(&self, path: &Path) -> bool {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let is_named = || {
@@ -57,19 +57,19 @@ impl Own {
     }
 }
 
-/// Whether a file is named as those of scans are: a word, a hyphen, a number of at least six digits.
+/// Returns true if a file is named like one of a scan: a word, a hyphen, a number of at least six digits.
 pub fn is_of_scan(name: &str) -> bool {
     let words = ["scan-", "range-", "shots-", "ticks-", "samples-", "explain-"];
     let rest = words.iter().find_map(|word| name.strip_prefix(word));
     rest.is_some_and(|rest| rest.bytes().take_while(u8::is_ascii_digit).count() >= 6)
 }
 
-/// Whether a file, and no link to one, stands at `path`.
+/// Returns true if `path` is a file and no link to one.
 fn is_file(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|about| about.is_file())
 }
 
-/// Whether a file carries a mark of ours.
+/// Returns true if a file carries a mark of ours.
 fn is_marked(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let (head, tail) = ends(path).unwrap_or_default();

@@ -6,9 +6,9 @@ use super::attributes::{Attribute, pixels, returns};
 use crate::points::PointCloud;
 use std::io::{self, Write};
 
-/// Writes a cloud whose columns are even. Where a shot has one return at most, every pixel: `WIDTH`
-/// are the columns, `HEIGHT` the rows; a pixel without a return is NaN, never 0. Where it may have
-/// several, and where there are no pixels, the returns as a list: `HEIGHT` is 1.
+/// Writes a cloud whose columns are even. If a shot has one return at most, the file has every pixel: `WIDTH`
+/// is the number of columns, `HEIGHT` the number of rows. A pixel without a return is NaN, never 0. If a shot
+/// may have several returns, or the cloud has no pixels, the file has the returns as a list: `HEIGHT` is 1.
 pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
     let attributes = Attribute::of(cloud);
     write_header(cloud, &attributes, names, out)?;
@@ -24,7 +24,7 @@ pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> i
     Ok(())
 }
 
-/// Whether the points are a list and no image.
+/// Returns true if the points are a list and no image.
 pub(super) fn is_list(cloud: &PointCloud) -> bool {
     let has_pixels = cloud.has(cloud.row.len()) && cloud.has(cloud.column.len());
     cloud.returns_per_shot > 1 || cloud.rows * cloud.columns == 0 || !has_pixels

@@ -41,8 +41,8 @@ struct Field<'a> {
 /// The cloud of a PCD file, and what it says beside it. Points without x, y and z are pixels that had
 /// no return. Truth is read if the file has the outcome.
 ///
-/// An organised file has an image, with a pixel for each of its points. A list has the image of which
-/// its header tells; a list of another program has no image: no rows, no columns.
+/// An organised file has an image, with a pixel for each of its points. A list has the image that its header
+/// describes; a list of another program has no image: no rows, no columns.
 pub(super) fn parse(file: &mut CloudFile, room: CloudRoom) -> Result<(PointCloud, About), String> {
     let (mut header, data) = parse_header(file)?;
     header.about.room = room;
@@ -149,7 +149,7 @@ impl Header {
         }
     }
 
-    /// The fields. Those of which the header does not tell size, type and count are single floats.
+    /// The fields. A field whose size, type and count are not in the header is a single float.
     fn fields(&self) -> Result<Vec<Field<'_>>, String> {
         let names = &self.fields;
         let lists = [&self.sizes, &self.types, &self.counts];
@@ -170,7 +170,7 @@ impl Header {
     }
 }
 
-/// Where our attributes are in binary points.
+/// Places of our attributes in binary points.
 fn layout(fields: &[Field]) -> Result<Layout, String> {
     let mut layout = Layout::default();
     for Field { name, kind, count } in fields {
@@ -205,15 +205,15 @@ fn unpacked(
              not; the file is damaged"
         ));
     }
-    // What is packed, and what comes of it field by field and point by point.
+    // The packed bytes, and the unpacked ones twice: field by field and point by point.
     room.check_beside(u64::from(packed) + 2 * size as u64, points as u64)?;
     let packed = file.bytes(packed.into())?.ok_or(cut_short)?;
     let columns = lzf::unpack(&packed, size).ok_or("its compressed points are damaged")?;
     Ok(interleave::columns(&columns, &widths, points))
 }
 
-/// Where our attributes are in points made of the words of a line; and of each field whether its words
-/// are kept, and how many they are.
+/// Places of our attributes in points made of the words of a line. For each field, true if its words are
+/// kept, and their number.
 fn layout_of_text(fields: &[Field]) -> (Layout, Vec<(bool, usize)>) {
     let mut layout = Layout::of_text();
     let mut words_of = Vec::new();

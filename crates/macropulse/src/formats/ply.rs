@@ -11,8 +11,8 @@ use super::number::Kind;
 use crate::points::PointCloud;
 use std::io::{self, Write};
 
-/// What stands before the names of attributes that CloudCompare is to take for scalar fields; it is
-/// no part of the name there.
+/// Prefix of the names of attributes that CloudCompare is to take for scalar fields; it is no part of the
+/// name there.
 pub(super) const SCALAR: &str = "scalar_";
 
 /// How properties are called.

@@ -27,7 +27,7 @@ impl Stored {
     }
 }
 
-/// Of what an element is made.
+/// Part of an element.
 enum Property {
     Number(Kind),
     /// A number that says how many follow, and these.
@@ -48,11 +48,11 @@ struct Header {
     before: Vec<Element>,
     /// The points.
     vertices: Option<Element>,
-    /// Whether an element behind the points has begun.
+    /// True if an element behind the points has begun.
     is_over: bool,
     /// The single numbers of the points.
     layout: Layout,
-    /// What they mean, in their order.
+    /// The meanings of these numbers, in their order.
     meanings: Vec<Option<Meaning>>,
 }
 

@@ -80,7 +80,7 @@ impl PtxScans {
     }
 }
 
-/// What the first numbers of a point are.
+/// Attributes of the first numbers of a point.
 const PLACED: [Attribute; 4] = [Attribute::X, Attribute::Y, Attribute::Z, Attribute::Intensity];
 
 impl About {
@@ -123,7 +123,7 @@ impl Scans for PtxScans {
     }
 }
 
-/// How many scans begin in a file, of which the last may be cut short.
+/// Counts the scans that begin in a file; the last one may be cut short.
 fn count(lines: &mut Lines) -> Result<usize, String> {
     let mut scans = 0;
     while !lines.file.is_blank()? {
@@ -161,7 +161,7 @@ impl Lines {
     }
 }
 
-/// What stands before the points of a scan.
+/// The lines before the points of a scan.
 struct Header {
     columns: usize,
     rows: usize,
@@ -241,7 +241,7 @@ mod tests {
         1.333333 2.333333 3.333 0.312\n1.444444 2.444444 3.444 0.423\n0 0 0 0\n\
         1.555555 2.555555 3.555 0.534\n1.666666 2.666666 3.666 0.678\n";
 
-    /// Where LAStools puts the points of the example \[PTX\].
+    /// Positions of the points of the example \[PTX\] according to LAStools.
     const WORLD: [[f64; 3]; 6] = [
         [2.156, 10.553, 2.685],
         [2.017, 10.480, 2.796],

@@ -12,7 +12,7 @@ pub struct Recording {
     folder: PathBuf,
     formats: Vec<Format>,
     open: Vec<(Format, Messages)>,
-    /// Whether a user typed the names of the files.
+    /// True if a user typed the names of the files.
     is_named: bool,
 }
 
@@ -45,8 +45,8 @@ impl Recording {
         self.add_as(cloud, names, |format| format.file_name(cloud.scan))
     }
 
-    /// As [`Recording::add`], with another name for the file of a format. Where all scans of a run go
-    /// into one file, the first name counts.
+    /// As [`Recording::add`], with another name for the file of a format. If all scans of a run go into one
+    /// file, the first name counts.
     ///
     /// # Errors
     /// As [`write_cloud`](super::write_cloud); files written before stay.

@@ -299,7 +299,7 @@ pub(super) enum Digits {
     Single,
     /// More.
     Double,
-    /// As many as are written in a text.
+    /// The digits that are written in a text.
     AsWritten,
 }
 

@@ -1,5 +1,5 @@
-//! Neighbouring rays down a hierarchy, as a beam: eight boxes at once are tested against the pyramid
-//! around all of them, and only at a leaf is it asked which rays enter.
+//! Neighbouring rays down a hierarchy, as a beam. Eight boxes at once are tested against the pyramid around
+//! all rays, and only the boxes of leaves against each ray.
 
 use super::packet::{Lanes, Leaves, Packet};
 use super::single::{PutOff, put_off};
@@ -9,8 +9,8 @@ use super::wide::{LANES, Registers, SIDE, Wide, fetch};
 /// Rays are neighbours if their directions differ by no more than this for each of them, summed over
 /// the axes.
 ///
-/// Measured on fans of sixteen at a city of 250 000 triangles and at a car of 50 000: there a beam
-/// and rays alone are equally fast at 16 to 32 mrad from ray to ray.
+/// Measured on fans of sixteen at a city of 250 000 triangles and at a car of 50 000. A beam and rays alone
+/// are equally fast there at 16 to 32 mrad from ray to ray.
 const NEIGHBOURS: f32 = 0.016;
 
 /// The rays of a packet as boxes and triangles need them.
@@ -81,8 +81,8 @@ impl Aims {
         Spread { set, greatest: R::greatest_of_each(&numbers, set) }
     }
 
-    /// The rays of `among` that point into the same octant as the first of them, and have the same
-    /// main axis. What is known of the `spread` of some is used if they are the same.
+    /// The rays of `among` that point into the same octant as the first of them, and have the same main axis.
+    /// `spread` is used if it is that of the same rays.
     #[inline(always)]
     pub fn beam<R: Registers>(&self, among: u32, spread: &Spread) -> Beam {
         let first = among.trailing_zeros();
@@ -95,8 +95,8 @@ impl Aims {
         let greatest =
             if set == spread.set { spread.greatest } else { self.spread::<R>(set).greatest };
         let [.., soonest, latest] = greatest;
-        // Of slopes of one sign the greatest has the least inverse, and rounding keeps them in order. Eight,
-        // two of them unused, are divided at once.
+        // Among slopes of one sign the greatest has the least inverse, and rounding keeps them in order.
+        // Eight, two of them unused, are divided at once.
         let [x_most, x_least, y_most, y_least, z_most, z_least, ..] = inverses(&greatest);
         Beam {
             set,
@@ -118,7 +118,7 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// Whether the rays are neighbours.
+    /// Returns true if the rays are neighbours.
     #[inline(always)]
     pub fn is_narrow(&self) -> bool {
         let [x_least, x_most, y_least, y_most, z_least, z_most, ..] = self.greatest;
@@ -306,8 +306,8 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
         [near.times(least).least(near.times(most)), far.times(least).most(far.times(most))]
     }
 
-    /// Where each ray crosses a plane of box `box_at`, by axis; the low one or the high one. A box has
-    /// [`SIDE`] times the number of its node, and its place in it.
+    /// Returns the distances at which the rays cross the low or the high plane of box `box_at` on an axis.
+    /// The number of a box is [`SIDE`] times the number of its node, plus its place in it.
     #[inline(always)]
     fn reached(&self, box_at: u32, axis: usize, bound: usize) -> R::Rays {
         let bounds = &self.eights[box_at as usize / SIDE].bounds;
@@ -357,7 +357,7 @@ impl<'a, R: Registers, const FROM_CENTRE: bool> Descent<'a, R, FROM_CENTRE> {
                     }
                 }
             }
-            // What was put off may by now lie behind the nearest hits.
+            // Boxes that were put off may by now lie behind the nearest hits.
             (child, place) = loop {
                 if waiting == 0 {
                     return;

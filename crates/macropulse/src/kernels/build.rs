@@ -1,9 +1,9 @@
 //! Builds a hierarchy of boxes from the top.
 //!
-//! A range of items is cut in two where the surface area heuristic expects the fewest tests: a line
-//! that enters a box enters one within it with the ratio of their surfaces \[Wal07\]. The cut is
-//! looked for at a few places of each axis. A node is a range after up to seven cuts, the largest
-//! part cut first.
+//! A range of items is cut in two where the surface area heuristic expects the fewest tests. A line that
+//! enters a box enters one within it with a probability that is the ratio of their surfaces \[Wal07\]. The
+//! cut is looked for at a few places of each axis. A node is a range after up to seven cuts, the largest part
+//! cut first.
 
 use std::ops::Range;
 
@@ -15,8 +15,9 @@ use super::wide::{Any, Registers, SIDE, Task, Wide, on_level};
 /// Places of an axis at which a range may be cut, and one more.
 const BINS: usize = 16;
 
-/// From so many items on they are put into two sets of bins by turns: neighbours are mostly put into the same bin, and one
-/// has to wait for the other. To load 4.8 million triangles takes a twentieth less time, from 32 items on as well.
+/// Number of items from which on they are put into two sets of bins by turns. Neighbours are mostly put into
+/// the same bin, and in one set they have to wait for each other. Loading 4.8 million triangles takes a
+/// twentieth less time; from 32 items on the gain is the same.
 const TWO_SETS: usize = 128;
 
 /// Cuts above a range before it is only halved. Boxes that all overlap, as of a fan or of triangles
@@ -64,7 +65,7 @@ impl Growing {
     }
 }
 
-/// What a hierarchy is built over: a box, with the halves of its index in the lanes left over, as
+/// An item of a hierarchy: a box, with the halves of its index in the lanes left over. The halves are
 /// numbers: as bits they would be subnormal, which is slow to compute with.
 #[derive(Clone, Copy)]
 struct Item(Growing);
@@ -104,7 +105,7 @@ pub(crate) struct Built {
     pub tree: Tree,
     /// The indices of the items, by leaf.
     pub order: Vec<u32>,
-    /// Where in that order each leaf ends.
+    /// End of each leaf in that order.
     pub ends: Vec<u32>,
 }
 
@@ -211,7 +212,7 @@ struct Halves {
 }
 
 impl Halves {
-    /// Of no items.
+    /// Halves without items.
     const NONE: Self =
         Self { count: 0, bounds: [Growing::NOWHERE; 2], middles: [Bounds::NOWHERE; 2] };
 }
@@ -232,7 +233,7 @@ fn halve(items: &mut [Item], axis: usize, halves: &mut Halves) {
     }
 }
 
-/// Where the bins of a part lie on each axis.
+/// Places of the bins of a part on each axis.
 struct Ruler {
     low: Vec3A,
     /// Bins per length.
@@ -357,11 +358,11 @@ impl Cut<'_> {
     }
 }
 
-/// The bin at a place, counted in bins; where two meet it may be either. What is no number, on an axis without extent, is
-/// in the first.
+/// Returns the bin at a place, counted in bins; where two meet it may be either. A place that is NaN, on an
+/// axis without extent, is in the first.
 ///
-/// From 2²³ on an `f32` is a whole number, sums are rounded to one, and the last bits tell how far from there it is: a
-/// conversion takes longer, 2 % of the time to load a mesh.
+/// From 2²³ on an `f32` is a whole number. Sums are rounded to one, and its last bits are the distance from
+/// 2²³. A conversion takes longer: 2 % of the time to load a mesh.
 #[inline(always)]
 fn bin(place: f32) -> usize {
     const WHOLE: f32 = (1 << 23) as f32;
@@ -379,7 +380,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Boxes with whole coordinates, of which many coincide where `cells` is small.
+    /// Boxes with whole coordinates; many of them coincide if `cells` is small.
     fn boxes(seed: u64, count: usize, cells: i32) -> Vec<Bounds> {
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let mut corner = || Vec3A::from([0; 3].map(|_| chance.random_range(0..cells) as f32));
@@ -479,8 +480,8 @@ mod tests {
         }
     }
 
-    /// Boxes that coincide, that all share a corner, and that double in size, so that every cut
-    /// takes one off: they are halved in the end, and not cut one by one to the last.
+    /// Boxes that coincide, that all share a corner, and that double in size, so that every cut takes one
+    /// off. They are halved in the end, and not cut one by one to the last.
     #[test]
     fn the_depth_is_bounded_whatever_the_boxes() {
         let count = 20_000;

@@ -4,8 +4,8 @@ use macropulse_codec::level::Level;
 
 /// Amounts in cells of equal probability, each shared by two of them.
 ///
-/// The leading bits of a number choose the cell, the others whether they are below its bound, the
-/// upper 32 bits; then the next 16 bits are the amount, the cell's own, else the last 16.
+/// The leading bits of a number choose the cell, whose upper 32 bits are a bound. If the other bits of the
+/// number are below it, the amount is the cell's own: its next 16 bits. Otherwise it is the last 16 bits.
 #[derive(Debug)]
 pub(crate) struct Amounts {
     cells: Vec<u64>,
@@ -28,7 +28,7 @@ impl Amounts {
         &self.cells
     }
 
-    /// What `number` draws.
+    /// Returns the amount that `number` draws.
     #[inline]
     pub(crate) fn drawn(&self, number: u32) -> i32 {
         let cell = self.cells[(number >> (32 - self.bits)) as usize];
@@ -73,15 +73,15 @@ impl Amounts {
     }
 }
 
-/// Cells of a short table: so many that sixteen registers hold all of it.
+/// Cells of a short table: sixteen registers hold all of them.
 const SHORT: usize = 256;
 
 /// A table of [`SHORT`] cells whose own amounts count up from `first`, and whose other ones fit
 /// into a byte.
 #[derive(Debug)]
 struct Short {
-    /// Of each cell the bound in the upper 24 bits, as many as a number has left; the other amount
-    /// in the lower 8.
+    /// The cells. The upper 24 bits are the bound: a number has 24 bits left behind its index. The lower 8
+    /// bits are the other amount.
     cells: [u32; SHORT],
     first: i32,
 }
@@ -123,9 +123,9 @@ mod avx512 {
 
     const STEP: usize = 16;
 
-    /// Where sixteen amounts at a time are looked up.
+    /// A table in which sixteen amounts at a time are looked up.
     pub(super) trait Table: Copy {
-        /// What each number draws.
+        /// Returns the amount that each number draws.
         ///
         /// # Safety
         /// The processor must have AVX-512, and what the table was made of must still be there.
@@ -236,7 +236,7 @@ mod avx512 {
     impl Table for Memory {
         #[inline(always)]
         unsafe fn drawn(self, number: __m512i) -> __m512i {
-            // SAFETY: the processor has AVX-512, and an index of so many bits is that of a cell.
+            // SAFETY: the processor has AVX-512, and the table has a cell for each index.
             unsafe {
                 let lower =
                     _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
@@ -263,7 +263,7 @@ mod tests {
     use macropulse_codec::level::forced::at_each_level;
     use proptest::prelude::*;
 
-    /// A cell of so many own amounts out of 2³².
+    /// A cell with `bound` own amounts out of 2³².
     fn cell(bound: u32, own: i16, other: i16) -> u64 {
         u64::from(bound) << 32 | u64::from(own as u16) << 16 | u64::from(other as u16)
     }

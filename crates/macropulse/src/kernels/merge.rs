@@ -1,28 +1,27 @@
 //! Two ascending rows become one.
 //!
-//! Sixteen numbers at a time: the lower half of two sorted vectors goes out, the upper half meets
-//! the next vector of the row whose next number is the smaller one. Two sorted vectors are
-//! separated and sorted by a bitonic network \[Bat68\].
+//! Sixteen numbers are taken at a time. The lower half of two sorted vectors goes out, and the upper half
+//! meets the next vector of the row whose next number is the smaller one. Two sorted vectors are separated
+//! and sorted by a bitonic network \[Bat68\].
 //!
-//! Each step waits for the one before it, which leaves a processor idle a quarter of the time. Long
-//! rows are cut into parts that are merged side by side, each where its share of the result begins:
-//! so many numbers of the one row and so many of the other, found by bisection.
+//! Each step waits for the one before it, which leaves a processor idle a quarter of the time. Long rows are
+//! cut into parts that are merged side by side. Bisection finds how many numbers of either row come before
+//! each part.
 
 use macropulse_codec::level::Level;
 
 /// Numbers taken at once.
 const STEP: usize = 16;
 
-/// A row ends with so many numbers that are larger than any other, so that its end need not be
-/// tested for.
+/// Numbers at the end of a row that are larger than any other, so that its end need not be tested for.
 pub(crate) const PAD: [u32; 3 * STEP] = [u32::MAX; 3 * STEP];
 
-/// Rows are cut into so many parts: 4096 numbers take 0.46 to 0.52 ns each, and not 0.62 as in one;
-/// eight parts gain no more (Zen 4, twice, in cache).
+/// Parts of a long row: 4096 numbers take 0.46 to 0.52 ns each, and not 0.62 as in one part; eight parts gain
+/// no more (Zen 4, twice, in cache).
 const PARTS: usize = 4;
 
-/// Where cutting begins to pay: of 256 numbers bisection takes what it saves, of 512 about 10 % are
-/// left.
+/// Numbers from which on cutting pays: bisection costs what cutting saves with 256 numbers, and leaves a gain
+/// of about 10 % with 512.
 const LONG: usize = 512;
 
 /// Puts `a` and `b`, which ascend and end with [`PAD`], into `merged`, in order and without the
@@ -76,7 +75,7 @@ mod avx512 {
         _mm512_shuffle_i64x2, _mm512_storeu_si512,
     };
 
-    /// Appends both rows, `all` numbers, merged in so many parts.
+    /// Appends both rows, `all` numbers, merged in `PARTS` parts.
     #[target_feature(enable = "avx512f")]
     pub(super) fn append<const PARTS: usize>(
         a: &[u32],
@@ -110,7 +109,7 @@ mod avx512 {
             }
         }
         let length = merged.len() + all;
-        // SAFETY: so many numbers were written one behind the other.
+        // SAFETY: `all` numbers were written one behind the other.
         unsafe { merged.set_len(length) }
     }
 

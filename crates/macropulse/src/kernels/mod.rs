@@ -2,10 +2,11 @@
 //! library is in this folder.
 //!
 //! A loop is written once, in plain Rust, and compiled for each [`Level`](macropulse_codec::level::Level);
-//! [`on_every_level!`](macropulse_codec::on_every_level) calls the widest version that the processor at hand can run. The plain version is what other
-//! processors run and what the tests compare the others with. Where comparisons are to become sets
-//! of lanes, which compilers do poorly, [`wide`] spells out the few operations. Compilers never contract or
-//! reassociate floating-point arithmetic of Rust, so that every level gives the same bits.
+//! [`on_every_level!`](macropulse_codec::on_every_level) calls the widest version that the processor at hand
+//! can run. The plain version is what other processors run and what the tests compare the others with.
+//! Compilers turn comparisons into sets of lanes poorly: for these [`wide`] spells out the few operations.
+//! Compilers never contract or reassociate floating-point arithmetic of Rust, so that every level gives the
+//! same bits.
 
 #![allow(unsafe_code)]
 // Lanes of several arrays are walked in step, by their number.

@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use macropulse_codec::level::Level;
 
-/// Keeps those of `times[from..]` whose number in `numbers` is below `bound`; the first one of
-/// both belong together, and there are as many numbers at least.
+/// Keeps the times in `times[from..]` whose number is below `bound`. The first of them belongs to the first
+/// of `numbers`, and so on; there is at least one number per time.
 pub(crate) fn keep_below(times: &mut Vec<u32>, from: usize, numbers: &[u32], bound: u32) {
     let Some(asked) = times.get_mut(from..) else { return };
     let kept = match Level::here() {
@@ -94,7 +94,7 @@ mod avx512 {
         unsafe { _mm512_storeu_si512(numbers.as_mut_ptr().cast(), value) }
     }
 
-    /// What is kept never passes what is still to be read, so that both may be in one place.
+    /// The kept times never pass those still to be read, so that both may be in one place.
     #[target_feature(enable = "avx512f,popcnt")]
     pub(super) fn keep_below(times: &mut [u32], numbers: &[u32], bound: u32) -> usize {
         let limit = _mm512_set1_epi32(bound as i32);

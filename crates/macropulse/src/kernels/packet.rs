@@ -84,7 +84,7 @@ impl Packet {
     }
 }
 
-/// What the leaves of a hierarchy are, for a packet that comes by.
+/// The leaves of a hierarchy, for a packet that comes by.
 pub(super) trait Leaves {
     /// Lets the rays of `set`, which are no neighbours, descend alone, if they are better off so;
     /// whether it has.

@@ -131,8 +131,8 @@ proptest! {
     }
 }
 
-/// A ray in the plane of a triangle that it only touches, at a corner √33 m away, meets it there or not at all, and
-/// no nearer: what lies before is still met first.
+/// A ray lies in the plane of a triangle and only touches it, at a corner √33 m away. It meets the triangle
+/// there or not at all, and no nearer: a triangle before it is still met first.
 #[test]
 fn a_triangle_seen_edge_on_is_met_where_it_is() {
     let (origin, corner) = ([2.0, 4.0, -4.0], [4.0, 2.0, 1.0]);

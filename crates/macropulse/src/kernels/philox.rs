@@ -16,7 +16,7 @@ pub(crate) const GROUP: usize = 4 * BLOCKS;
 
 const ROUNDS: usize = 10;
 const MULTIPLIERS: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
-/// What the key grows by from round to round: the golden ratio and √3 − 1.
+/// Steps of the key from round to round: the golden ratio and √3 − 1.
 const STEPS: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const LOW: u64 = 0xFFFF_FFFF;
 

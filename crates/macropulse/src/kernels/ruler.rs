@@ -13,7 +13,7 @@ pub(crate) struct Ruler {
 }
 
 impl Ruler {
-    /// So many `parts` in a tick of `tick_fs`.
+    /// A ruler with this number of `parts` in a tick of `tick_fs`.
     pub(crate) fn new(parts: u32, tick_fs: i64) -> Self {
         let parts_per_fs = f64::from(parts) / tick_fs as f64;
         Self { parts: i64::from(parts), tick_fs, parts_per_fs }

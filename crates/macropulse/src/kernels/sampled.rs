@@ -6,8 +6,8 @@ use macropulse_codec::on_every_level;
 const TOGETHER: usize = 4;
 
 on_every_level! {
-    /// Puts a·g + c·(g² − 1), of which a and c are the `mixture`, into `mixed` for the normal number g of each two
-    /// words of random bits.
+    /// Puts a·g + c·(g² − 1) into `mixed` for the normal number g of each two words of random bits. The
+    /// `mixture` is a and c.
     pub(crate) fn mixed(low: &[u32], high: &[u32], mixture: (f32, f32), mixed: &mut [f32]) {
         let (linear, quadratic) = mixture;
         for ((mixed, low), high) in mixed.iter_mut().zip(low).zip(high) {
@@ -38,12 +38,13 @@ on_every_level! {
     }
 }
 
-/// 3·2²²: a number far smaller than this, added to it, is rounded to a whole one, halves to the even one, which is
-/// then in the lowest bits of the sum.
+/// 3·2²²: a far smaller number, added to it, is rounded to a whole one, halves to the even one. The whole
+/// number is then in the lowest bits of the sum.
 const WHOLE: f32 = 12_582_912.0;
 
 on_every_level! {
-    /// The nearest codes to signals of so many photons, `steps` to each.
+    /// Puts the nearest codes to the signals in `level`, in photons, into `codes`. A photon is `steps` codes,
+    /// and codes end at the limits `between`.
     pub(crate) fn rounded(level: &[f32], steps: f32, between: [f32; 2], codes: &mut [i16]) {
         let [low, high] = between;
         for (code, level) in codes.iter_mut().zip(level) {

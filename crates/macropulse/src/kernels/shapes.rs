@@ -6,10 +6,10 @@ use super::packet::{Lanes, Packet};
 use super::wide::LANES;
 use macropulse_codec::on_every_level;
 
-/// Where a line enters a shape and where it leaves, as distances, nearest first; NaN or infinite
-/// if it does not. Beside each the face: 0…5 of a box (twice the axis, one more for the side of
-/// larger coordinates), so 4 and 5 of the ends of a frustum; [`CURVED`] where the normal follows from
-/// the place; 0 of a plane.
+/// Distances at which a line enters and leaves a shape, nearest first; NaN or infinite if it does not. The
+/// face stands beside each. A box has the faces 0…5 (twice the axis, one more for the side of larger
+/// coordinates), so the ends of a frustum are 4 and 5. A plane is 0, and [`CURVED`] is a face whose normal
+/// follows from the place.
 pub(crate) type Crossings = [(f64, u32); 2];
 
 /// The face of a shape whose normal follows from the place.
@@ -26,8 +26,7 @@ pub(crate) enum Form {
     Box([f64; 3]),
     /// A cylinder or a cone along z, cut square at both ends.
     Frustum(Frustum),
-    /// All points within the radius, first, of a piece of the z axis, of which half the length is
-    /// second.
+    /// All points within a radius of a piece of the z axis: the radius, and half the length of the piece.
     Capsule([f64; 2]),
     /// An ellipsoid with these half axes, along the axes.
     Ellipsoid([f64; 3]),
@@ -83,7 +82,7 @@ fn cuboid(origin: DVec3, along: DVec3, half: DVec3) -> Crossings {
     ]
 }
 
-/// What two stretches of a line have in common; that of the `ends`, if equal, wins.
+/// The common part of two stretches of a line; if two crossings are equal, that of `ends` wins.
 #[inline(always)]
 fn both(side: Crossings, ends: Crossings) -> Crossings {
     let enter = if side[0].0 > ends[0].0 { side[0] } else { ends[0] };
@@ -106,14 +105,14 @@ fn slab(start: f64, slope: f64, half: f64) -> Crossings {
     if slope > 0.0 { [(low, 4), (high, 5)] } else { [(high, 5), (low, 4)] }
 }
 
-/// The common stretch of the slab and of what lies within the side, x² + y² ≤ (m + k·z)² with
-/// m + k·z ≥ 0: with o moved to the point of the line nearest to the middle, so that nothing
-/// cancels however far the shape is,
+/// The common stretch of the slab and of the points within the side, x² + y² ≤ (m + k·z)² with m + k·z ≥ 0.
+/// First o is moved to the point of the line nearest to the middle, so that nothing cancels however far the
+/// shape is. A point lies within the side if
 ///
 /// a·t² + 2b·t + c ≤ 0, a = d_x² + d_y² − k²·d_z², b = o_x·d_x + o_y·d_y − k·d_z·R, c = o_x² + o_y² − R²
 ///
-/// with R = m + k·o_z. Where a < 0 the line runs more steeply than the side, and of the two nappes of
-/// the cone one counts.
+/// with R = m + k·o_z. If a < 0, the line runs more steeply than the side, and one of the two nappes of the
+/// cone counts.
 #[inline(always)]
 fn frustum(origin: DVec3, along: DVec3, shape: &Frustum) -> Crossings {
     let Frustum { middle, slope, half } = *shape;
@@ -131,7 +130,7 @@ fn frustum(origin: DVec3, along: DVec3, shape: &Frustum) -> Crossings {
     } else {
         let far = -(b + square.sqrt().copysign(b));
         let (one, other) = (far / a, c / far);
-        // Where a is 0 one of them is infinite, to the side on which the line stays within.
+        // If a is 0, one of them is infinite, on the side on which the line stays within.
         match (a > 0.0, widens > 0.0) {
             (true, _) => (one.min(other), one.max(other)),
             (false, true) if a == 0.0 => (other, f64::INFINITY),
@@ -195,7 +194,7 @@ fn first([enter, leave]: Crossings, nearest: f64, farthest: f64) -> (f64, u32) {
     }
 }
 
-/// Where one ray, in the frame of the shape, meets it.
+/// Returns the range at which one ray, in the frame of the shape, meets it, and the face.
 pub(crate) fn meet(
     form: &Form,
     (origin, along): (DVec3, DVec3),
@@ -206,9 +205,9 @@ pub(crate) fn meet(
 }
 
 on_every_level! {
-    /// Where the rays of a packet meet a shape before `limit`; NaN for those that do not.
-    /// `origin` is that of the packet and `turn` carries its directions into the frame of the
-    /// shape.
+    /// Returns the ranges at which the rays of a packet meet a shape before `limit`, and the faces; NaN for
+    /// rays that do not. `origin` is that of the packet and `turn` carries its directions into the frame of
+    /// the shape.
     pub(crate) fn meet_packet(
         form: &Form,
         turn: &DMat3,

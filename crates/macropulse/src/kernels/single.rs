@@ -27,7 +27,7 @@ pub(super) struct Aim<const FROM_CENTRE: bool> {
     pub shear: [f32; 2],
 }
 
-/// What the leaves of a hierarchy are, for a ray that comes by.
+/// The leaves of a hierarchy, for a ray that comes by.
 pub(super) trait RayLeaves {
     /// Notes that a leaf may soon be met.
     #[inline(always)]
@@ -137,7 +137,7 @@ impl<L: RayLeaves> Along<'_, L> {
                     limit = narrow_above(self.leaves.meet::<R, FROM_CENTRE>(leaf, aim), aim.margin);
                 }
             }
-            // What was put off may by now lie behind the nearest hit.
+            // Boxes that were put off may by now lie behind the nearest hit.
             child = loop {
                 if waiting == 0 {
                     return;
@@ -152,8 +152,8 @@ impl<L: RayLeaves> Along<'_, L> {
     }
 }
 
-/// A box that waits during a descent: where it is entered, not below zero, in the upper half as bits, whose
-/// order is that of the numbers; and which it is.
+/// A box that waits during a descent. The upper half is the distance at which it is entered, not below zero,
+/// as bits, whose order is that of the numbers. The lower half says which box it is.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct PutOff(u64);
 
@@ -163,7 +163,7 @@ impl PutOff {
         Self(u64::from(enter.to_bits()) << 32 | u64::from(what))
     }
 
-    /// Where it is entered, and which it is.
+    /// Returns the distance at which it is entered, and which it is.
     #[inline(always)]
     pub(super) fn parts(self) -> (f32, u32) {
         (f32::from_bits((self.0 >> 32) as u32), self.0 as u32)
@@ -195,7 +195,7 @@ pub(super) fn put_off(
 }
 
 impl Eight {
-    /// Where a ray crosses the low or the high planes of an axis.
+    /// Returns the distances at which a ray crosses the low or the high planes of an axis.
     #[inline(always)]
     fn reached<R: Registers, const FROM_CENTRE: bool>(
         &self,

@@ -4,7 +4,7 @@
 use macropulse_codec::on_every_level;
 
 on_every_level! {
-    /// Whether each of `later` follows the one of `earlier` in the same place by `least` or more;
+    /// Returns true if each of `later` follows the one of `earlier` in the same place by `least` or more;
     /// both of one length.
     pub(crate) fn all_apart(earlier: &[u32], later: &[u32], least: u32) -> bool {
         let count = later.len().min(earlier.len());

@@ -7,7 +7,7 @@ use macropulse_codec::level::Level;
 /// Marks written at once; code words are padded to a multiple of it.
 pub(crate) const STEP: usize = 16;
 
-/// Where the marks of a pulse train come from.
+/// The origin of the marks of a pulse train.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Train<'a> {
     /// Times of the marks of the code word, padded to a multiple of [`STEP`].

@@ -20,7 +20,7 @@ pub(super) struct Eight {
     pub child: [Child; SIDE],
 }
 
-/// What is in a box: eight others, or a leaf.
+/// Contents of a box: eight others, or a leaf.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Child(u32);
 
@@ -128,7 +128,7 @@ impl Tree {
     pub(super) fn new(centre: [f64; 3], bounds: Bounds, eights: Vec<Eight>, depth: usize) -> Self {
         let reach = bounds.low.abs().max(bounds.high.abs()).max_element();
         let bounds = [0, 1, 2].map(|axis| [bounds.low[axis], bounds.high[axis]]);
-        // Of each node on the way down all but one wait, of the last one all.
+        // All boxes but one of each node on the way down wait, and all of the last node.
         Self { centre, bounds, reach, eights, room: (SIDE - 1) * depth + 1 }
     }
 
@@ -141,8 +141,8 @@ impl Tree {
         (near && !self.eights.is_empty()).then(|| local.as_vec3().to_array())
     }
 
-    /// What a limit in `f64` must be stretched by so that no box before it is passed over: the
-    /// rounding of the coordinates to `f32`.
+    /// Returns the length by which a limit in `f64` must be stretched so that no box before it is passed
+    /// over: the rounding of the coordinates to `f32`.
     #[inline(always)]
     pub(super) fn margin(&self, origin: [f32; 3]) -> f32 {
         let [x, y, z] = origin;

@@ -1,10 +1,10 @@
 //! Triangles that rays meet, and one ray among them.
 //!
-//! Which triangle a ray passes through is decided in `f32`, in a frame about the sensor so that
-//! nothing is far from its origin. The test is the watertight one of \[WBW13\]: the corners are
-//! sheared so that the ray becomes the depth axis, and the sign of each edge is exact, so two
-//! triangles that share an edge can never both miss a ray. How far the hit is, is then solved
-//! in `f64` on the plane of the triangle as it was modelled.
+//! Which triangle a ray passes through is decided in `f32`, in a frame about the sensor so that nothing is
+//! far from its origin. The test is the watertight one of \[WBW13\]. The corners are sheared so that the ray
+//! becomes the depth axis. The sign of each edge is exact, so two triangles that share an edge can never both
+//! miss a ray. The distance of the hit is then solved in `f64` on the plane of the triangle as it was
+//! modelled.
 
 use glam::{DVec3, Vec3A};
 
@@ -60,8 +60,8 @@ impl Triangles {
             (index, Bounds { low: a.min(b).min(c), high: a.max(b).max(c) })
         });
         let Built { tree, order, ends } = Built::over(boxes, SIDE, centre);
-        // What is in the old order is dropped here: of millions of triangles no list is kept longer
-        // than it is needed.
+        // The list in the old order is dropped here: no list of millions of triangles is kept longer than it
+        // is needed.
         corners = order.iter().map(|index| corners[*index as usize]).collect();
         let mut first = 0;
         let block = |end: &u32| {
@@ -184,7 +184,7 @@ impl RayLeaves for Nearest<'_> {
 }
 
 impl Block {
-    /// Triangles with these corners, of which the first is leaf number `first`.
+    /// Triangles with these corners; the first one is leaf number `first`.
     fn new(first: u32, triangles: &[Corners], centre: [f64; 3]) -> Self {
         let mut block =
             Self { corners: [[[0.0; SIDE]; 3]; 3], first, count: triangles.len() as u32 };
@@ -313,7 +313,7 @@ fn holding_origin<const N: usize, W: Wide<N>>(
     among & sure | settle(&wide, unsure)
 }
 
-/// Of the lanes in `unsure`, those that pass; their u of three corners, then their v.
+/// Returns the lanes in `unsure` that pass. `wide` has the u of three corners, then their v.
 #[cold]
 #[inline(never)]
 fn settle<const N: usize>(wide: &[[f32; N]; 6], unsure: u32) -> u32 {
@@ -348,13 +348,13 @@ struct Plane {
     corners: [DVec3; 3],
     /// n·(a−o)
     height: f64,
-    /// Whether the place is so near to the plane, for how far the corners are, that where a ray from there meets
-    /// it is lost in rounding.
+    /// True if the place is so near to the plane, relative to the distance of the corners, that the range of
+    /// a ray from there is lost in rounding.
     is_edge_on: bool,
 }
 
-/// A place is near to a plane if they are apart by no more than this share of how far the corners are: that
-/// is 10⁸ times what rounding makes of it, and what it makes of a range is then less than boxes are widened by.
+/// Largest distance of a place that is near to a plane, as a share of the distance of the corners. It is 10⁸
+/// times its rounding error. Beyond it, the rounding error of a range is less than boxes are widened by.
 const EDGE_ON: f64 = 1e-8;
 
 impl Plane {
@@ -367,14 +367,14 @@ impl Plane {
         let origin = DVec3::from(origin);
         let corners = [a - origin, b - origin, c - origin];
         let height = normal.dot(corners[0]);
-        // Of a needle the normal is lost in rounding as well: the sides tell what it may be.
+        // The normal of a needle is lost in rounding as well: the sides tell how large it may be.
         let (one, other) = (one.length_squared(), other.length_squared());
         let reach = corners[0].length_squared() + one + other;
         let is_edge_on = height * height <= EDGE_ON * EDGE_ON * one * other * reach;
         Self { normal, corners, height, is_edge_on }
     }
 
-    /// Where a ray from the place that passes through the triangle meets it.
+    /// Returns the range at which a ray from the place that passes through the triangle meets it.
     #[inline(always)]
     fn range(&self, direction: [f64; 3]) -> f64 {
         let range = self.crossing(direction);
@@ -397,7 +397,7 @@ impl Plane {
         range.max(enter).min(leave)
     }
 
-    /// Where a ray from the place meets the plane; NaN if that is nowhere.
+    /// Returns the range at which a ray from the place meets the plane; NaN if it does not.
     ///
     /// `t = n·(a−o) / n·d`, kept within the depths of the three corners.
     #[inline(always)]

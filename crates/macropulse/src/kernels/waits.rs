@@ -8,7 +8,7 @@ use super::philox::GROUP;
 use macropulse_codec::level::Level;
 use macropulse_codec::on_every_level;
 
-/// Where the line ends. Waits are cut off there, so that the sum of sixteen stays in 32 bits.
+/// End of the line. Waits are cut off there, so that the sum of sixteen stays in 32 bits.
 pub(crate) const END: u32 = 1 << 27;
 
 /// Waits summed together.
@@ -21,14 +21,14 @@ pub(crate) struct Events {
     pub(crate) mean: f32,
     /// The times found are divided by 2 to the power of this, 0 to 31.
     pub(crate) shift: u32,
-    /// What is added to the times then.
+    /// Added to the divided times.
     pub(crate) start: u32,
 }
 
 impl Events {
-    /// Appends to `times` the events that follow one at `after`, with so many uniform numbers.
-    /// Gives when the last one happens, before it is divided; if that is at [`END`] or later, it
-    /// and others like it have been left out.
+    /// Appends to `times` the events that follow one at `after`, one per uniform number. Returns the time of
+    /// the last one before it is divided; if that is [`END`] or later, it and others like it have been left
+    /// out.
     pub(crate) fn append(&self, numbers: &[u32; GROUP], after: u32, times: &mut Vec<u32>) -> u32 {
         let mut waits = [0; GROUP];
         waits_for(numbers, self.mean, &mut waits);
@@ -58,8 +58,8 @@ on_every_level! {
     }
 }
 
-/// Puts the times of events in place of the waits for them, until the line ends; gives the last
-/// one as it is before it is divided, and how many there are.
+/// Puts the times of events in place of the waits for them, until the line ends. Returns the time of the last
+/// one before it is divided, and the number of events.
 fn sum_up(waits: &mut [u32; GROUP], after: u32, events: &Events) -> (u32, usize) {
     let (mut last, mut summed) = (after, 0);
     while summed < GROUP && last < END {

@@ -339,13 +339,13 @@ mod x86 {
 
         #[inline(always)]
         fn load(values: &[f32; SIDE]) -> Self {
-            // SAFETY: the array has as many numbers, and the processor the feature.
+            // SAFETY: the array has eight numbers, and the processor has the feature.
             Self(unsafe { _mm256_loadu_ps(values.as_ptr()) })
         }
 
         #[inline(always)]
         fn store(self, values: &mut [f32; SIDE]) {
-            // SAFETY: the array has as many numbers, and the processor the feature.
+            // SAFETY: the array has eight numbers, and the processor has the feature.
             unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) }
         }
 
@@ -405,14 +405,14 @@ mod x86 {
         #[inline(always)]
         fn load(values: &[f32; LANES]) -> Self {
             let start = values.as_ptr();
-            // SAFETY: the array has as many numbers, and the processor the feature.
+            // SAFETY: the array has sixteen numbers, and the processor has the feature.
             unsafe { Self(Eight(_mm256_loadu_ps(start)), Eight(_mm256_loadu_ps(start.add(SIDE)))) }
         }
 
         #[inline(always)]
         fn store(self, values: &mut [f32; LANES]) {
             let start = values.as_mut_ptr();
-            // SAFETY: the array has as many numbers, and the processor the feature.
+            // SAFETY: the array has sixteen numbers, and the processor has the feature.
             unsafe {
                 _mm256_storeu_ps(start, self.0.0);
                 _mm256_storeu_ps(start.add(SIDE), self.1.0);
@@ -472,13 +472,13 @@ mod x86 {
 
         #[inline(always)]
         fn load(values: &[f32; LANES]) -> Self {
-            // SAFETY: the array has as many numbers, and the processor the feature.
+            // SAFETY: the array has sixteen numbers, and the processor has the feature.
             Self(unsafe { _mm512_loadu_ps(values.as_ptr()) })
         }
 
         #[inline(always)]
         fn store(self, values: &mut [f32; LANES]) {
-            // SAFETY: the array has as many numbers, and the processor the feature.
+            // SAFETY: the array has sixteen numbers, and the processor has the feature.
             unsafe { _mm512_storeu_ps(values.as_mut_ptr(), self.0) }
         }
 

@@ -196,8 +196,8 @@ mod avx512 {
         listed
     }
 
-    /// Writes the marks of all bits listed, of `STEPS` times sixteen marks with their padding, or as
-    /// many as the words have where that is 0.
+    /// Writes the marks of all bits listed. A bit has `STEPS` times sixteen marks with their padding; if
+    /// `STEPS` is 0, the length of the padded words counts.
     ///
     /// # Safety
     /// There must be room for the marks of all bits and the padding of the last, and the words
@@ -211,7 +211,7 @@ mod avx512 {
         let steps = if STEPS == 0 { words.padded / STEP } else { STEPS };
         let mut place = places.as_mut_ptr();
         for (start, word) in bits.start.iter().zip(&bits.word).take(listed) {
-            // SAFETY: so many bits were listed; the rest is what is asked for above.
+            // SAFETY: the first `listed` bits were listed; the caller guarantees the rest.
             unsafe {
                 let start = _mm512_set1_epi32(start.assume_init() as i32);
                 let word = word.assume_init() as usize;

@@ -81,9 +81,8 @@ attributes! {
     ReturnNumber = measured("return_number", "", Byte(field!(0, return_number)));
     /// Returns of the shot.
     NumberOfReturns = measured("number_of_returns", "", Byte(field!(0, number_of_returns)));
-    /// Bits: 1 for a return with fewer than half of its marks, 2 for one for which another lag had
-    /// as many, 4 for one whose intensity is a lower bound: no mark was missed, and no amplitude is
-    /// measured.
+    /// Bits: 1 if fewer than half of its marks were found, 2 if another lag had the same number of marks, 4
+    /// if the intensity is a lower bound. It is one if no mark was missed and no amplitude is measured.
     Flags = measured("flags", "", Bit(field!(false, saturated)));
     /// Radial velocity, m/s, positive of a surface that approaches; of sensors that measure it.
     RadialVelocity = measured("radial_velocity", "m/s", Real(field!(f32::NAN, radial_velocity)));
@@ -117,7 +116,7 @@ attributes! {
     );
 }
 
-/// What is declared of an attribute.
+/// The declaration of an attribute.
 struct Entry {
     about: Text,
     name: Text,
@@ -149,7 +148,7 @@ pub(crate) enum Storage {
     Bit(Field<bool>),
     /// The cosine of the angle.
     Cosine(Field<f32>),
-    /// What the number stands for.
+    /// The outcome that the number stands for.
     Code(Field<Outcome>),
 }
 
@@ -176,13 +175,13 @@ pub(crate) struct Extent {
     pub name: Text,
     pub found: usize,
     pub needed: usize,
-    /// What it has an entry for.
+    /// Name of the things that have an entry each.
     pub of: Text,
     /// The columns it is there together with, if it is not there by itself.
     pub group: Option<Group>,
 }
 
-/// Columns of which all are there or none.
+/// Columns that are all there, or none of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Group {
     Coordinates,
@@ -190,7 +189,7 @@ pub(crate) enum Group {
     Truth,
 }
 
-/// What is done with a field whatever the type of its entries.
+/// Operations on a field, whatever the type of its entries.
 pub(super) trait Columns: Sync {
     /// The extents of its columns in `cloud`.
     fn extents(&self, cloud: &PointCloud, group: Option<Group>) -> Vec<Extent>;
@@ -342,22 +341,23 @@ impl Attribute {
         self.entry().unit
     }
 
-    /// What it is, in a sentence or two.
+    /// Its description, in a sentence or two.
     pub fn about(self) -> &'static str {
         self.entry().about.trim_start()
     }
 
-    /// Whether it is known from the scene alone.
+    /// Returns true if it is known from the scene alone.
     pub fn is_true(self) -> bool {
         self.entry().is_true
     }
 
-    /// Whether every cloud with a truth has it: all that is true, but what only some sensors measure.
+    /// Returns true if every cloud with a truth has it: all true attributes but the one that only some
+    /// sensors measure.
     pub(crate) fn comes_with_truth(self) -> bool {
         self.is_true() && self != Self::TrueRadialVelocity
     }
 
-    /// Whether its values are computed from columns when they are asked for.
+    /// Returns true if its values are computed from columns when they are asked for.
     pub fn is_computed(self) -> bool {
         matches!(self.storage(), Bit(_) | Cosine(_) | Code(_))
     }
@@ -372,7 +372,7 @@ impl Attribute {
         Self::ALL.into_iter().find(|attribute| attribute.name() == name)
     }
 
-    /// Whether `cloud` has it.
+    /// Returns true if `cloud` has it.
     pub fn is_in(self, cloud: &PointCloud) -> bool {
         let has = |attribute: Self| {
             attribute.extents(cloud).first().is_some_and(|column| cloud.has(column.found))
@@ -394,8 +394,8 @@ impl Attribute {
         self.is_in(cloud).then(|| self.values(cloud, None))
     }
 
-    /// Its values for all pixels of an `image` of `cloud`: that of the return which is shown or, without
-    /// one, NaN or 0, or the truth of the first surface along the beam.
+    /// Returns its values for all pixels of an `image` of `cloud`. A pixel has that of the return which is
+    /// shown. Without one it has NaN or 0, or the truth of the first surface along the beam.
     pub fn image<'a>(self, cloud: &'a PointCloud, image: &Image) -> Entries<'a> {
         self.values(cloud, Some(image))
     }

@@ -38,7 +38,7 @@ impl Image {
         self.returns.len()
     }
 
-    /// Whether there is no pixel at all.
+    /// Returns true if there is no pixel at all.
     pub fn is_empty(&self) -> bool {
         self.returns.is_empty()
     }
@@ -59,9 +59,8 @@ impl Image {
         self.iter().map(value).collect()
     }
 
-    /// What stands beside `pixel` of `cloud`: the surface of the return it shows or, without one, the
-    /// first surface along its beam. The outcome is that of the pixel
-    /// if this is the image of the cloud's own pick.
+    /// Returns the surface of `pixel` of `cloud`: that of the return it shows or, without one, the first
+    /// surface along its beam. The outcome is that of the pixel if this is the image of the cloud's own pick.
     pub fn surface(&self, cloud: &PointCloud, pixel: usize) -> Surface {
         let truth = &cloud.truth;
         self.get(pixel).map_or_else(|| truth.pixels.at(pixel), |at| truth.returns.at(at))

@@ -60,8 +60,8 @@ impl Outcome {
     }
 }
 
-/// One scan as a list of returns, in the order in which their shots were fired, those of one shot
-/// nearest first: the order in which they are decoded, so nothing is sorted on the way.
+/// One scan as a list of returns, in the order in which their shots were fired; returns of one shot stand
+/// nearest first. They are decoded in this order, so nothing is sorted on the way.
 ///
 /// All columns have one entry per return, except those of pixels, which have `rows` × `columns`
 /// entries, row-major, row 0 at the top and column 0 at the left. A simulated cloud has all columns.

@@ -20,7 +20,7 @@ pub struct Piece {
     pub shot: Vec<u32>,
     /// For each owned shot, the index of its pixel.
     pixel: Vec<u32>,
-    /// Whether these are one after the other.
+    /// True if these are one after the other.
     in_a_row: bool,
 }
 
@@ -126,8 +126,8 @@ impl Piece {
 }
 
 impl PointCloud {
-    /// The cloud of a scan: what `frame` says of all of it, the returns of `pieces` behind each
-    /// other, and their pixels at their places; pixels that are in none of them are empty.
+    /// The cloud of a scan: the properties of the whole scan from `frame`, the returns of `pieces` behind
+    /// each other, and their pixels at their places. Pixels that are in none of them are empty.
     pub fn joined(frame: &Self, pieces: &[Piece]) -> Self {
         let pixels = frame.rows * frame.columns;
         let fields: Vec<_> = Attribute::fields().collect();

@@ -1,9 +1,8 @@
 //! The scale of reflectance: from a receiver's measurement of a return to the reflectance of its surface.
 //!
-//! Intensity is the photons that a mark brought over those that a white surface seen square on would
-//! have brought from the same range. A receiver knows its range, by its own estimate, its link budget
-//! or the sensitivity it is declared by, the air, and the law of its own detector; of the scene it
-//! knows nothing.
+//! Intensity is the photons that a mark brought over those that a white surface seen square on would have
+//! brought from the same range. A receiver knows its range by its own estimate, its link budget or its
+//! declared sensitivity, the air, and the law of its own detector. It knows nothing of the scene.
 //!
 //! 1. An amplitude is a number of photons, and so is the result of a receiver of samples.
 //! 2. A count of marks tells the share of them that made an event, as μ = −ln(1 − share). If every photon
@@ -26,7 +25,7 @@ const LEAST: f64 = 1e-3;
 const PER_E: f64 = 40.0;
 
 /// The scale of intensity ends here. No material of a scene is brighter than 1.2·10⁵: a return of 10⁶ is
-/// light that no surface at its range sent back, for example a dark count at a range at which a field of
+/// light that no surface at its range sent back. An example is a dark count at a range at which a field of
 /// view that follows the beam has moved on, and white would bring nothing.
 const BRIGHTEST: f64 = 1e6;
 
@@ -89,8 +88,9 @@ impl Scale {
     }
 }
 
-/// ln μ and ln n, n the photons with which a mark makes an event with probability 1 − exp(−μ), as long as
-/// that is neither certain nor, by noise alone, nearly as likely without light; empty if μ is n.
+/// Pairs of ln μ and ln n: with n photons a mark makes an event with probability 1 − exp(−μ). Photons are
+/// left out if the event is certain, or if noise alone makes it nearly as likely. The list is empty if μ is
+/// n.
 fn law(design: &Design, operating: &Operating) -> Vec<(f64, f64)> {
     let detector = design.detector.model();
     let (background, falling) = (operating.background, operating.false_rate);

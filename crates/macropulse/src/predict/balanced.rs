@@ -50,7 +50,7 @@ pub(super) fn chances(
     Chances { pd, false_per_shot: by_chance, found, lone: Lone::default() }
 }
 
-/// So many lit dark chips are left out as are less likely than this.
+/// Numbers of lit dark chips that are less likely than this are left out.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Lags that are as bright as each other.
@@ -105,9 +105,9 @@ impl Gate {
     }
 }
 
-/// The lags of the gate, by how much of their chips is lit: phases of the chip clock at which light in
-/// step arrives, `late` in a tick, and all others, where there is noise. A mark is looked for in `width`
-/// ticks.
+/// The lags of the gate, by the share of their chips that is lit. These are the phases of the chip clock at
+/// which light in step arrives, `late` in a tick, and all others, where there is noise. A mark is looked for
+/// in `width` ticks.
 fn phases(
     design: &Design,
     correlation: &Correlation,
@@ -227,8 +227,9 @@ mod tests {
         let design = Design::open("bipolar-gold", &[]).unwrap();
         let correlation = design.receiver.method.correlation().unwrap();
         let found = Found { seen: 0.4, false_density: 1e-6 };
-        // Light in the middle of a tick is found where either of two begins; at its edge it is found where
-        // the one before it begins, and half of it one earlier and one later.
+        // Light in the middle of a tick lies in the windows that begin at either of two ticks. Light at the
+        // edge of a tick lies in the window that begins at the tick before it, and half of it in the windows
+        // one earlier and one later.
         for (late, expected) in [(0.5, [0.4, 0.4, 0.0]), (0.0, [0.4, 0.2, 0.2])] {
             let phases =
                 phases(&design, correlation, (&BTreeMap::from([(64, 1)]), &found), (2, late));

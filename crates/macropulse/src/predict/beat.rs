@@ -1,13 +1,13 @@
 //! Probability that a receiver of beats finds a target, in closed form.
 //!
 //! The field of an echo is a complex normal variable, so that its photons S in a ramp are exponential about
-//! their mean. In a bin beside its beat the field is that of S·h², h the amplitude of the window there, with
-//! the noise of a complex normal variable: its power exceeds γ with Marcum's Q₁(√(2·S·h²), √(2γ)). The peak
-//! is the stronger one of the two bins beside a beat. Behind a window their noise is correlated, with ρ: the
-//! probability that both exceed γ at once is taken to lie ρ² between that of independent powers and that of
-//! equal ones. A return needs a power of γ in each ramp, and of x in both together. Any place of a beat in
-//! its bin is equally likely, in each ramp. The line of the laser leaves less light in step, and lets beats
-//! wander.
+//! their mean. In a bin beside its beat the field is that of S·h² photons, h the amplitude of the window
+//! there, with the noise of a complex normal variable. Its power exceeds γ with the probability Q₁(√(2·S·h²),
+//! √(2γ)) of Marcum. The peak is the stronger one of the two bins beside a beat. Behind a window their noise
+//! is correlated, with ρ. The probability that both exceed γ at once is taken to lie at the share ρ² of the
+//! way from that of independent powers to that of equal ones. A return needs a power of γ in each ramp, and
+//! of x in both together. Any place of a beat in its bin is equally likely, in each ramp. The line of the
+//! laser leaves less light in step, and lets beats wander.
 
 use std::f64::consts::PI;
 

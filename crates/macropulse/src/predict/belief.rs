@@ -1,7 +1,7 @@
 //! Closed form of the thorough matched receiver's findings in ticks.
 //!
-//! It believes in a shot if evidence and prior reach a threshold, [`belief`]. Of N marks, k ~ Bin(N, p) are
-//! lit. All shots meet the same range. Two things depend on which other shots are found:
+//! It believes in a shot if evidence and prior reach a threshold, [`belief`]. A shot has N marks; k ~ Bin(N,
+//! p) are lit. All shots meet the same range. Two things depend on which other shots are found:
 //!
 //! * **Neighbours.** A return beside a shot makes its lag likelier. With F, the share of all shots that are fuller and
 //!   found, one of the M shots that are asked is a neighbour with the probability 1 − (1 − F)^M.
@@ -197,9 +197,9 @@ impl Gate {
         let needed = [alone, beside].map(|prior| threshold - libm::log(prior));
         let lit = shots.false_density.min(0.999);
         let false_ticks = -libm::expm1(libm::log1p(-lit) / ticks);
-        // With a tick of light in a share s of the places, and false ones in a share D of them, which d ticks
-        // a tick are, a place has s + (W − s)·d ticks and is lit with the probability s + D − s·D. If each
-        // photon makes an event of its own, ticks about a mark do not count.
+        // A share s of the places has a tick of light. A share D of them has false ones, d per tick. So a
+        // place has s + (W − s)·d ticks and is lit with the probability s + D − s·D. If each photon makes an
+        // event of its own, ticks about a mark do not count.
         let of_light = (1.0 - (1.0 - shots.seen.share(1.0)) / (1.0 - lit)).max(0.0);
         let (zone, surplus) = match correlation.photons_apart {
             true => (ticks + 2.0 * (ticks / 2.0).floor(), 0.0),

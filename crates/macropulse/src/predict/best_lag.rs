@@ -50,8 +50,8 @@ impl BestLag {
         Self::seen_by(width, light, libm::log1p(-sight.density.min(0.999_999)) / width as f64)
     }
 
-    /// The sights of light that is seen from one tick to another with the probability `light`, in places of
-    /// `width` ticks, each left dark by other light with a probability of this logarithm.
+    /// Lags of light that is seen from one tick to another with the probability `light`, in places of `width`
+    /// ticks. Other light leaves a tick dark with a probability whose logarithm is `log_dark`.
     fn seen_by(width: i64, light: impl Fn(i64, i64) -> f64, log_dark: f64) -> Self {
         let within = |from: i64, to: i64| {
             1.0 - (1.0 - light(from, to)) * libm::exp(log_dark * (to - from) as f64)
@@ -79,9 +79,9 @@ impl BestLag {
         self.best_of(marks).0
     }
 
-    /// How likely the likeliest lag is after those of neighbours, beside what it is where all have the same: the mean of
-    /// 1/(1 + |l − m|), where m is half of the times the best lag of a neighbour, and half of the times on the line
-    /// through those of two.
+    /// Returns how likely the likeliest lag l is after those of neighbours, relative to neighbours that all
+    /// have the same lag. It is the mean of 1/(1 + |l − m|). Half of the times m is the best lag of a
+    /// neighbour, and half of the times it is on the line through those of two.
     pub fn agreement(&self, marks: f64) -> f64 {
         let is_best = self.best_of(marks).1;
         let each = self.lags.iter().zip(&is_best).filter(|(_, chance)| **chance > SELDOM);

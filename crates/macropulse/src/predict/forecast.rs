@@ -38,8 +38,8 @@ pub enum Error {
     },
 }
 
-/// Over the threshold, the amplitude at which the marks of a word must be told apart for there to be a
-/// forecast: marks that are just seen, and twice as bright.
+/// Amplitude over the threshold at which the marks of a word must be told apart for there to be a forecast.
+/// Marks of this amplitude are twice as bright as marks that are just seen.
 const TOLD_APART: f64 = 2.0;
 
 /// A sensor in an environment, perhaps with more or less light than it has.
@@ -91,10 +91,15 @@ pub struct Forecast {
     pub bank_loss: f64,
     /// Probability that a place in the gate is lit by something else.
     pub density: f64,
-    /// Ratio of the marks expected to the spread of what is there by chance, (p − d)·√N/√(d·(1 − d))
-    /// of a shot with the mean number of marks; without a code, photons to their noise, infinite where the
-    /// sensor never misses; of a histogram √(2Λ), Λ the logarithm of the likelihood of its mean counts with an echo
-    /// over that without.
+    /// Ratio of signal to noise:
+    ///
+    /// * with a code, the marks expected over the spread of those lit by chance, (p − d)·√N/√(d·(1 − d)), of
+    ///   a shot with the mean number N of marks;
+    /// * without a code, photons over their noise, infinite if the sensor never misses;
+    /// * of samples, the mean of the marks over its noise;
+    /// * of a histogram, √(2Λ), Λ the logarithm of the likelihood of its mean counts with an echo over that
+    ///   without;
+    /// * without pulses, amplitude over noise.
     pub snr: f64,
     /// Probability that a shot which is lit gives a return there.
     pub pd: f64,
@@ -532,8 +537,8 @@ const PLACES: i32 = 64;
 /// Brightnesses of an echo of `cells` speckle cells, M, in units of its mean, and the share of each. They
 /// follow the gamma distribution M^M·x^(M − 1)·exp(−M·x)/Γ(M).
 ///
-/// Its cube root is nearly normal with the mean 1 − 1/9M and the deviation 1/(3·√M) \[WH31\]: in steps of half
-/// a deviation, to four of them, the density of that is summed.
+/// Its cube root is nearly normal with the mean 1 − 1/9M and the deviation 1/(3·√M) \[WH31\]. The density of
+/// the root is summed in steps of half a deviation, up to four deviations.
 fn brightnesses(cells: f64) -> Vec<(f64, f64)> {
     let (middle, deviation) = (1.0 - 1.0 / (9.0 * cells), 1.0 / (3.0 * cells.sqrt()));
     let roots = (-8..=8).map(|step| middle + 0.5 * f64::from(step) * deviation);
@@ -634,7 +639,7 @@ fn sunk(design: &Design, detector: &Sampled, background: f64) -> Option<(String,
     })
 }
 
-/// So many standard deviations of the noise must have room below the baseline.
+/// Standard deviations of the noise that must have room below the baseline.
 const SEEN_BELOW: f64 = 4.0;
 
 /// The least number from `low` to `high` for which `holds` is true, to a part in a million, if it is false

@@ -4,8 +4,8 @@ use crate::units::{range_from_tof, tof_from_range};
 
 /// Detection events per second that another lidar makes in a detector that counts photons: r·m·k·(1 − e⁻ⁿ).
 ///
-/// r shots per second whose light arrives, each of m `marks` on average with n `photons` per mark,
-/// of which the detector keeps the fraction `kept` (docs/physics.md#photon-counting).
+/// The light of r shots per second arrives, each of m `marks` on average with n `photons` per mark. The
+/// detector keeps the fraction k, `kept`, of the events (docs/physics.md#photon-counting).
 pub fn events_per_second(shots_per_second: f64, marks: f64, photons: f64, kept: f64) -> f64 {
     shots_per_second * marks * kept * -libm::expm1(-photons)
 }
@@ -20,8 +20,9 @@ pub fn ghost_of_single_pulses(shots_per_second: f64, min_range: f64, range: f64)
     (shots_per_second * open).clamp(0.0, 1.0)
 }
 
-/// How much nearer, m, the ghosts of an identical lidar that fires in step come with every scan of
-/// `period` seconds, if its clock runs fast by the fraction `drift`: the range of drift·period.
+/// Distance, m, by which the ghosts of an identical lidar that fires in step come nearer with every scan of
+/// `period` seconds. Its clock runs fast by the fraction `drift`, and the distance is the range of
+/// drift·period.
 pub fn walk_per_scan(drift: f64, period: f64) -> f64 {
     range_from_tof(drift * period)
 }

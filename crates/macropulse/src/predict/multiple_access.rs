@@ -6,12 +6,12 @@
 //! mistaken where the K − 1 others fill the word between them. One of them adds k marks with the
 //! probability q_k of [`Hits`].
 //!
-//! The formulas draw the hits of all interferers independently, from the average over all pairs
-//! of words. Real pairs differ: C0 of a prime code meets any other word exactly once at every lag,
-//! and the others are not all alike either. So the truth lies a little beside. The soft formula,
-//! with all words sending, says 1.2 % too much for p = 5 and 1.5 % too little for p = 7; with all
-//! words but C0 it is exact for p = 5 and says 0.5 % too much for p = 7. The hard formula says 5 %
-//! and 13 % too much for p = 5, because real hits do not fall on random marks.
+//! The formulas draw the hits of all interferers independently, from the average over all pairs of words.
+//! Real pairs differ: C0 of a prime code meets any other word exactly once at every lag, and the others are
+//! not all alike either. So the truth lies a little beside. The soft formula, with all words sending, says
+//! 1.2 % too much for p = 5 and 1.5 % too little for p = 7. With all words but C0 it is exact for p = 5 and
+//! says 0.5 % too much for p = 7. The hard formula says 5 % and 13 % too much for p = 5, because real hits do
+//! not fall on random marks.
 
 use crate::units::{range_from_tof, tof_from_range};
 use macropulse_codec::code::correlation::{aperiodic, periodic};
@@ -127,10 +127,10 @@ impl Hits {
         Self::of_counts(&counts)
     }
 
-    /// As `words` meet each other where an interferer begins at any chip of the bit that is received:
-    /// the end of one of its bits and the beginning of the next are seen, either lit half of the time.
-    /// With b₀, b₁ the bits and C the aperiodic correlation, b₀·C(τ − L) + b₁·C(τ) marks are met, all
-    /// pairs of different words and all τ from 0 to L − 1 alike.
+    /// As `words` meet each other if an interferer begins at any chip of the bit that is received. The end of
+    /// one of its bits and the beginning of the next are seen, either lit half of the time. With b₀, b₁ the
+    /// bits and C the aperiodic correlation, b₀·C(τ − L) + b₁·C(τ) marks are met. All pairs of different
+    /// words and all τ from 0 to L − 1 count alike.
     pub fn of_unaligned_words(words: &[CodeWord]) -> Self {
         let mut counts: Vec<u64> = Vec::new();
         let ordered = words.iter().enumerate().flat_map(|(i, own)| {
@@ -236,8 +236,8 @@ fn choose(n: usize, k: usize) -> f64 {
     (0..k).fold(1.0, |ways, drawn| ways * (n - drawn) as f64 / (drawn + 1) as f64)
 }
 
-/// Probability that the interferers between them raise a count from 0 to w or beyond, where each
-/// raises it by 0, 1 … λ with the chances that `raise` gives for the present count.
+/// Probability that the interferers between them raise a count from 0 to w or beyond. Each raises it by 0, 1
+/// … λ with the chances that `raise` gives for the present count.
 ///
 /// Adds products of positive numbers only, so the relative error stays near K·10⁻¹⁶ however
 /// small the result.

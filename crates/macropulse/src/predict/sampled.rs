@@ -1,10 +1,10 @@
 //! Probability that a receiver of samples finds a target that all shots of a channel meet alike, as far as
 //! its light does not meet that of others.
 //!
-//! A mark of n photons is a height n·g(δ) behind the matched filter, δ the part of a tick by which it is
-//! beside a sample, with the noise of the filtered samples and of its own photons. The marks of a word are
-//! judged as the receiver does it: none counts much more than the least, their mean must exceed the
-//! threshold. That is summed over points that fill the cube of all probabilities evenly.
+//! Behind the matched filter, a mark of n photons is a height n·g(δ) with the noise of the filtered samples
+//! and of its own photons. Here δ is the part of a tick by which it is beside a sample. The marks of a word
+//! are judged as the receiver does it: none counts much more than the least, and their mean must exceed the
+//! threshold. The probability is summed over points that fill the cube of all probabilities evenly.
 
 use macropulse_codec::decode::{self, Sampling};
 use macropulse_codec::statistics::{normal_quantile, normal_tail};
@@ -321,5 +321,6 @@ pub fn deepest_baseline(design: &Design, sampled: &Sampled) -> f64 {
 /// Time constants after which less than a hundredth of what a mark did to the baseline is left.
 const REMEMBERED: f64 = 5.0;
 
-/// As many shots at most, whatever the baseline remembers: of more each does next to nothing to it.
+/// Most shots that are followed, whatever the baseline remembers: if it remembers more, each does next to
+/// nothing to it.
 const MOST_SHOTS: f64 = 1e5;

@@ -34,8 +34,8 @@ pub struct Aside {
 /// what the threshold of the receiver is for.
 #[derive(Debug, Clone)]
 pub(super) struct Sidelobes {
-    /// For each number d of marks that do not count at them: how many sidelobes there are, the mean
-    /// over macropulses, and the sum of the squares of how far off these are, m².
+    /// For each number d of marks that do not count at them: the number of sidelobes, and the sum of their
+    /// squared distances from the peak, m². Both are means over macropulses.
     own: Vec<(usize, f64, f64)>,
 }
 

@@ -77,10 +77,9 @@ pub fn checks(by_day: &Forecaster, by_night: &Forecaster, wanted: &Wanted) -> Ve
     checks
 }
 
-/// The light that a receiver needs which decides mark by mark and must see all, with probability
-/// 0.99, over the light there is from `wanted`, the mean number of marks taken; of a counter
-/// without noise, n = −ln(1 − 0.99^(1/N)) each. `None` where shots are not coded, and of a sensor that never
-/// misses.
+/// The light that a receiver needs which decides mark by mark, over the light there is from `wanted`. It must
+/// see all N marks, the mean number, with probability 0.99: a counter without noise needs n = −ln(1 −
+/// 0.99^(1/N)) photons of each. `None` if shots are not coded, or if the sensor never misses.
 pub fn mark_by_mark(forecaster: &Forecaster, wanted: &Wanted) -> Option<f64> {
     let design = forecaster.design();
     let marks = design.emission.coding().codebook.mean_weight();

@@ -6,13 +6,13 @@ use crate::design::Design;
 use crate::units::{FS_PER_S, s_from_fs};
 use macropulse_codec::ShotLog;
 
-/// Time over which a range is watched, fs: a microsecond, in which no surface of a scene turns to be seen from elsewhere,
-/// and 100 m change by 10⁻⁸ of what one at 1 m/s does where they are rounded.
+/// Time over which a range is watched, fs: a microsecond, in which no surface of a scene turns to be seen
+/// from elsewhere. The rounding of 100 m is 10⁻⁸ of the way of a surface at 1 m/s in this time.
 const STEP_FS: i64 = FS_PER_S / 1_000_000;
 
 impl Scene {
-    /// Radial velocities, m/s, of the places that `hits` of the shots of `log` have met, positive where they approach:
-    /// by how much their ranges decrease, their own motion and that of the sensor together.
+    /// Radial velocities, m/s, of the places that `hits` of the shots of `log` have met, positive if they
+    /// approach. Their ranges decrease at this speed by their own motion and that of the sensor together.
     pub(super) fn radial_velocities(
         &self,
         design: &Design,

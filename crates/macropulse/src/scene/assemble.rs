@@ -33,11 +33,11 @@ use crate::digest::Digest;
 use crate::environment::Environment;
 use crate::names::line_column;
 
-/// What has been put together so far.
+/// The parts of a scene that have been put together so far.
 struct Assembly<'a> {
     source: Source<'a>,
     base: &'a Path,
-    /// Whether meshes may name files anywhere.
+    /// True if meshes may name files anywhere.
     outside: bool,
     room: Room,
     /// Meshes in memory, by name; they go before files.
@@ -198,7 +198,7 @@ impl Assembly<'_> {
         Ok(height)
     }
 
-    /// What the objects of the file are called; refuses two of one name.
+    /// Returns the names of the objects of the file; refuses two of one name.
     fn names(&self, file: &SceneFile) -> Result<Vec<String>, Error> {
         let typed: Vec<Option<&Spanned<String>>> =
             file.objects.iter().map(|object| object.get_ref().name.as_ref()).collect();
@@ -286,7 +286,7 @@ impl Assembly<'_> {
         Ok(())
     }
 
-    /// Where the mesh of an object comes from.
+    /// Returns the origin of the mesh of an object.
     fn mesh_origin(&mut self, name: &str, written: &ObjectTyped) -> Result<Origin, Error> {
         let Some(path) = &written.mesh else {
             self.source.refuse_mesh_keys(written)?;
@@ -351,14 +351,14 @@ impl Assembly<'_> {
         Ok((DVec3::from(up.vector()), DVec3::from(forward.vector())))
     }
 
-    /// Where the thing called `name` stands and how it moves; enters it among what moves.
+    /// Returns the pose and motion of the thing called `name`; enters it among the moving things.
     fn motion(&mut self, name: &str, stand: &Stand) -> Result<Motion, Error> {
         let motion = self.source.motion(stand)?;
         self.enter(name, &motion);
         Ok(motion)
     }
 
-    /// Enters the thing called `name` among what moves, if it does.
+    /// Enters the thing called `name` among the moving things, if it moves.
     fn enter(&mut self, name: &str, motion: &Motion) {
         if motion.moves() {
             self.notes.push(format!("{name}: {}", motion.told()));
@@ -374,7 +374,7 @@ impl Assembly<'_> {
     }
 }
 
-/// Whether all of a mesh lies where coordinates may be.
+/// Returns true if all of a mesh lies where coordinates may be.
 fn reaches_no_farther(mesh: &Mesh) -> bool {
     let ends = mesh.bounds().into_iter().flat_map(|(low, high)| [low, high]);
     ends.flatten().all(is_length)

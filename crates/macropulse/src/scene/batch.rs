@@ -21,9 +21,9 @@ pub(super) struct Batch<'a> {
     through: Vec<f32>,
     farthest: f64,
     sensor_moves: bool,
-    /// When rays leave that are added now, fs.
+    /// Time at which rays that are added now leave, fs.
     now_fs: i64,
-    /// Where in the frame of the sensor they begin, m.
+    /// Place at which they begin, in the frame of the sensor, m.
     begin: [f64; 3],
     pose: Pose,
     world_from_sensor: Transform,
@@ -41,7 +41,7 @@ pub(super) struct Batch<'a> {
     hits: Hits,
 }
 
-/// What one ray of the packet has met.
+/// A surface that one ray of the packet has met.
 #[derive(Clone, Copy)]
 struct Surface {
     lane: usize,
@@ -122,7 +122,7 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// What all rays have met.
+    /// Returns the hits of all rays.
     pub(super) fn finish(mut self) -> Hits {
         self.flush();
         self.hits

@@ -40,8 +40,8 @@ impl Scene {
             return Self::open_in(path, room);
         }
         let builtin = path.to_str().and_then(Self::builtin);
-        // What is no scene at all is said as it is without changes.
-        // A pipe is none to look at twice.
+        // A name that is no scene at all gets the same error as without changes. A pipe cannot be looked at
+        // twice.
         if builtin.is_none() && (!path.exists() || path.is_dir()) {
             return Self::open(path);
         }
@@ -64,7 +64,7 @@ impl Scene {
         changes: &[(String, String)],
         room: Room,
     ) -> Result<Self, Error> {
-        // What is wrong without the changes is said with its place in the file.
+        // A fault without the changes is reported with its place in the file.
         match Self::from_toml_in(text, origin, base, room) {
             Ok(scene) if changes.is_empty() => return Ok(scene),
             // A change may allow it.
@@ -104,8 +104,8 @@ pub const OF_SCENE: &str = "scene:";
 /// The table of sun and air.
 const ENVIRONMENT: &str = "environment";
 
-/// Of `changes`, those of a scene, which are the keys behind `scene:` and those of its environment,
-/// and apart from them those of a sensor.
+/// Splits `changes` into those of a scene, which are the keys behind `scene:` and those of its environment,
+/// and those of a sensor.
 pub fn apart(changes: &[(String, String)]) -> Changes {
     let mut apart = Changes::default();
     for (key, value) in changes {
@@ -157,7 +157,7 @@ fn change(table: &mut Table, key: &str, typed: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// What `step` leads to from `value`.
+/// Returns the value that `step` leads to from `value`.
 fn below<'a>(value: &'a mut Value, step: &str) -> Result<&'a mut Value, String> {
     match value {
         Value::Table(inner) => entry(inner, step),
@@ -183,7 +183,7 @@ fn name(object: &Value) -> Option<&str> {
     object.get("name").and_then(Value::as_str)
 }
 
-/// What the scene has under the key `step` of a table.
+/// Returns the value that the scene has under the key `step` of a table.
 fn entry<'a>(table: &'a mut Table, step: &str) -> Result<&'a mut Value, String> {
     let hint = nearest(step, table.keys().map(String::as_str));
     let remedy = match hint {

@@ -85,7 +85,7 @@ impl Shape {
         }
     }
 
-    /// Whether a point in the frame of the shape lies inside. Nothing lies inside a plane.
+    /// Returns true if a point in the frame of the shape lies inside. Nothing lies inside a plane.
     pub(super) fn holds(&self, point: DVec3) -> bool {
         let beside = libm::hypot(point.x, point.y);
         match *self {
@@ -127,7 +127,7 @@ pub struct Solid {
     pose: Pose,
     to_world: Transform,
     from_world: Transform,
-    /// Of each face, in the world.
+    /// Normal of each face, in the world.
     normals: [[f64; 3]; 6],
     material: u16,
     object: u16,
@@ -153,7 +153,7 @@ impl Solid {
         self.shape
     }
 
-    /// Where it stands.
+    /// Its pose.
     pub fn pose(&self) -> Pose {
         self.pose
     }
@@ -237,8 +237,8 @@ impl Solid {
         Hit { range, normal, material: self.material, object: self.object }
     }
 
-    /// Where the rays of `packet` meet the solid before `limit`, and its face; NaN for those
-    /// that do not.
+    /// Returns the ranges at which the rays of `packet` meet the solid before `limit`, and its faces; NaN for
+    /// rays that do not.
     pub(super) fn meet_packet(
         &self,
         packet: &Packet,

@@ -1,19 +1,19 @@
 //! Rays in an order in which neighbours follow each other.
 //!
-//! A packet descends as a beam where its rays point nearly the same way. The lasers of a turning
-//! head fire one after the other, fanned out, and each is beside where it was a turn of all lasers ago:
-//! they are cast laser by laser, some turns at a time. Rays that come in no order point anywhere. They are
-//! put in the order of a curve that fills the sphere. What has been met is put back; each ray meets the
+//! A packet descends as a beam if its rays point nearly the same way. The lasers of a turning head fire one
+//! after the other, fanned out, and each is beside where it was a turn of all lasers ago. So they are cast
+//! laser by laser, some turns at a time. Rays that come in no order point anywhere. They are put in the order
+//! of a curve that fills the sphere. The hits are put back into the order of the rays. Each ray meets the
 //! same alone and in any packet, so nothing changes but the time.
 //!
-//! Measured (Zen 4, one thread): shuffled rays at a city of 340 000 triangles 5.2 → 15.5 million a
-//! second; at one of 250 000 those of a turning head with 64 lasers 19 million as they come, 25 in the order of
-//! the curve, 70 laser by laser.
+//! Measured (Zen 4, one thread), in million rays a second. Shuffled rays at a city of 340 000 triangles: 5.2
+//! → 15.5. A turning head with 64 lasers at a city of 250 000: 19 as the rays come, 25 in the order of the
+//! curve, 70 laser by laser.
 
 use crate::kernels::LANES;
 
-/// Rays are neighbours that are no farther apart than this, summed over the axes: pixels of a raster
-/// are up to 4 mrad apart, the lasers of a turning head 7 mrad.
+/// Rays are neighbours if they are no farther apart than this, summed over the axes. Pixels of a raster are
+/// up to 4 mrad apart, the lasers of a turning head 7 mrad.
 const BESIDE: f64 = 0.005;
 
 /// Pairs of rays that are looked at. More would judge a list that is half in order more surely: what is judged
@@ -30,12 +30,12 @@ const LASERS: usize = 256;
 /// Bits by which a direction is told from others, on each of two axes: 0.5 mrad.
 const BITS: u32 = 12;
 
-/// In which order neighbours among rays follow each other, by their indices.
+/// Order in which neighbours among rays follow each other, by their indices.
 #[derive(Debug)]
 pub(super) enum Order {
     /// As they come.
     AsTheyCome,
-    /// Of lasers that take turns, one laser after another.
+    /// Lasers take turns: one laser after another.
     ByLaser(Vec<u32>),
     /// As they follow each other on a curve that fills the sphere.
     AlongCurve(Vec<u32>),
@@ -50,7 +50,7 @@ pub(super) fn order(directions: &[[f64; 3]]) -> Order {
     }
 }
 
-/// How many rays later one comes that is beside a ray, for most of them; as far as a sample tells.
+/// Returns the number of rays after which one comes that is beside a ray, for most rays of a sample.
 fn neighbour(directions: &[[f64; 3]]) -> Option<usize> {
     let are_beside = |one: &[f64; 3], next: &[f64; 3]| {
         (0..3).map(|axis| (next[axis] - one[axis]).abs()).sum::<f64>() <= BESIDE
@@ -71,8 +71,8 @@ fn neighbour(directions: &[[f64; 3]]) -> Option<usize> {
     (1..=turns.min(directions.len().max(1) - 1)).find(most_are)
 }
 
-/// The indices of `count` rays of so many lasers that take turns: of as many turns as fill a packet those of
-/// one laser after another, so that what is cast together lies together.
+/// Returns the indices of `count` rays of `lasers` that take turns. The turns that fill a packet are in the
+/// order of one laser after another, so that rays that are cast together lie together.
 fn by_laser(count: u32, lasers: u32) -> Vec<u32> {
     let turns = lasers * LANES as u32;
     let mut order = Vec::with_capacity(count as usize);
@@ -85,7 +85,7 @@ fn by_laser(count: u32, lasers: u32) -> Vec<u32> {
     order
 }
 
-/// Whether most shots are in the `row` of the one before.
+/// Returns true if most shots are in the `row` of the one before.
 pub(super) fn are_in_rows(row: &[u16]) -> bool {
     let changes = row.windows(2).filter(|pair| pair[0] != pair[1]).count();
     2 * changes <= row.len()
@@ -117,7 +117,7 @@ fn along_curve(directions: &[[f64; 3]]) -> Vec<u32> {
     keyed.into_iter().map(|key| key as u32).collect()
 }
 
-/// Where a direction lies on a curve that goes from side to side of a cube, on each in the order of
+/// Returns the place of a direction on a curve that goes from side to side of a cube, on each in the order of
 /// interleaved bits \[Mor66\].
 fn place_on_curve([x, y, z]: [f64; 3]) -> u32 {
     let (long_x, long_y, long_z) = (x.abs(), y.abs(), z.abs());
@@ -200,13 +200,13 @@ mod tests {
         assert_eq!(order[..3], [0, 5, 10]);
         assert_eq!(order[16..18], [1, 6]);
         assert_eq!(order[5 * 16..][..2], [5 * 16, 5 * 17]);
-        // Of the last eight turns, the first and the last lasers.
+        // The last eight turns: the first and the last lasers.
         assert_eq!(order[5 * 32..][..8], [160, 165, 170, 175, 180, 185, 190, 195]);
         assert_eq!(order[order.len() - 7..], [164, 169, 174, 179, 184, 189, 194]);
         let mut sorted = order;
         sorted.sort_unstable();
         assert!(sorted.into_iter().eq(0..198));
-        // Of fewer turns than fill a packet nothing is told.
+        // Fewer turns than fill a packet tell nothing.
         assert_eq!(neighbour(&rays[..5 * 15]), None);
     }
 

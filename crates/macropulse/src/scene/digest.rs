@@ -1,4 +1,4 @@
-//! What of a scene goes into its digest: all that decides what light meets.
+//! The parts of a scene that go into its digest: all that decides what light meets.
 
 use super::closed_form::{Shape, Solid};
 use super::material::Diffuse;

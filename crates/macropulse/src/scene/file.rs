@@ -28,7 +28,7 @@ pub(super) struct SceneFile {
     pub version: Spanned<i64>,
     /// Short name; that of the file unless it is given.
     pub name: Option<String>,
-    /// Where the sensor stands, and how it moves.
+    /// Position, angles and motion of the sensor.
     #[serde(default)]
     pub sensor: Stand,
     /// Sun and air: the name of a ready environment, or a table of its keys. Without it
@@ -36,7 +36,7 @@ pub(super) struct SceneFile {
     #[serde(default)]
     #[schemars(schema_with = "schema::environment")]
     pub environment: Option<Spanned<toml::Value>>,
-    /// Whether meshes may name files outside the folder of the scene: their materials, their buffers.
+    /// True if meshes may name files outside the folder of the scene: their materials, their buffers.
     #[serde(default)]
     pub outside_files: bool,
     /// An endless plane.
@@ -44,7 +44,7 @@ pub(super) struct SceneFile {
     /// Materials of the scene's own, or in place of those of the library.
     #[serde(default, rename = "material")]
     pub materials: Vec<Spanned<Defined>>,
-    /// What stands in the scene.
+    /// Objects of the scene.
     #[serde(default, rename = "object")]
     pub objects: Vec<Spanned<ObjectTyped>>,
     /// Other lidars that shine into the scene.
@@ -66,7 +66,7 @@ pub(super) struct InterfererTyped {
     #[serde(default)]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub set: Table,
-    /// Where it stands, m: x forward, y left, z up.
+    /// Position, m: x forward, y left, z up.
     pub position_m: Option<Spanned<Triple>>,
     /// Turn to the left, degrees.
     #[schemars(range(min = -36000, max = 36000))]
@@ -96,7 +96,7 @@ pub(super) struct InterfererTyped {
 }
 
 impl InterfererTyped {
-    /// Where the lidar stands, and how it moves.
+    /// Position, angles and motion of the lidar.
     pub(super) fn stand(&self) -> Stand {
         Stand {
             position_m: self.position_m.clone(),
@@ -114,7 +114,7 @@ impl InterfererTyped {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Ground {
-    /// What it is made of: a material of the library, or one of the scene.
+    /// Its material: one of the library, or one of the scene.
     #[schemars(schema_with = "schema::material")]
     pub material: Spanned<String>,
     /// Its height, m.
@@ -132,7 +132,7 @@ pub(super) struct Ground {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Defined {
-    /// Name, of which case, spaces and underscores do not matter.
+    /// Name; case, spaces and underscores do not matter.
     pub name: String,
     /// Lambertian reflectance, 0 to 1; may be left out for a material of the library.
     #[schemars(range(min = 0, max = 1))]
@@ -176,7 +176,7 @@ pub(super) struct ObjectTyped {
     pub up: Option<Spanned<Axis>>,
     /// Axis of the mesh that points forward; `x` unless it is given, `z` of glTF.
     pub forward: Option<Spanned<Axis>>,
-    /// Where it stands, m: x forward, y left, z up.
+    /// Position, m: x forward, y left, z up.
     pub position_m: Option<Spanned<Triple>>,
     /// Turn to the left, degrees.
     #[schemars(range(min = -36000, max = 36000))]
@@ -197,7 +197,7 @@ pub(super) struct ObjectTyped {
     /// Poses at ascending times, in place of position, angles and motion: straight on and evenly turning in between.
     #[schemars(length(min = 2))]
     pub path: Option<Spanned<Vec<Spanned<WaypointTyped>>>>,
-    /// Whether the object is lifted so that its lowest point is at its z.
+    /// True if the object is lifted so that its lowest point is at its z.
     #[serde(default)]
     pub rest_on_ground: bool,
     /// Material of the whole object: one of the library, or of the scene.
@@ -209,7 +209,7 @@ pub(super) struct ObjectTyped {
     #[serde(default)]
     #[schemars(schema_with = "schema::materials")]
     pub materials: BTreeMap<String, Spanned<String>>,
-    /// Whether the points on it are counted.
+    /// True if the points on it are counted.
     #[serde(default)]
     pub target: bool,
     /// Further positions and angles, each with a motion of its own or none.
@@ -218,7 +218,7 @@ pub(super) struct ObjectTyped {
 }
 
 impl ObjectTyped {
-    /// Where the object itself stands, and how it moves.
+    /// Position, angles and motion of the object itself.
     pub(super) fn stand(&self) -> Stand {
         Stand {
             position_m: self.position_m.clone(),
@@ -357,8 +357,9 @@ impl Axis {
     }
 }
 
-/// What objects are called, in their order, of which these names are typed. One without a name is
-/// called by its number, from 1; where another has that name, by as many more as it takes.
+/// Returns the names of objects, in their order; `typed` has the names that are typed. An object without a
+/// name is called by its number, from 1. If another has that name, a further number follows, from 2: the
+/// first that is free.
 pub(super) fn object_names(typed: &[Option<&str>]) -> Vec<String> {
     let taken: HashSet<&str> = typed.iter().copied().flatten().collect();
     let automatic = |index: usize| {
@@ -381,7 +382,7 @@ pub(super) struct Source<'a> {
     pub place: Place,
 }
 
-/// What is told as the place of what is wrong.
+/// Kind of place that is told of a fault.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Place {
     /// Line and column, of a text that people have typed.
@@ -437,7 +438,7 @@ impl<'a> Source<'a> {
     pub(super) fn fault(&self, span: Range<usize>, message: impl Into<String>) -> Error {
         let (origin, message) = (self.origin.to_owned(), message.into());
         if self.place == Place::Key {
-            // What is missing has the whole text as its place, or none.
+            // A missing key has the whole text as its place, or none.
             let is_whole = span == (0..0) || span == (0..self.text.len());
             let key = key_at(self.text, span.start).filter(|_| !is_whole).unwrap_or_default();
             return Error::Keyed { origin, key, message };

@@ -11,8 +11,8 @@ const BLOCK: usize = 64;
 /// Cells of an axis by which corners are put in order.
 const CELLS: f64 = 32.0;
 
-/// Verticals for which all corners are looked at: to put them into blocks takes as long as some forty
-/// of these (26 ms each with 4.8 million triangles, against 1 s), and as much memory as the mesh.
+/// Verticals for which all corners are looked at. Putting them into blocks takes as long as some forty of
+/// these (26 ms each with 4.8 million triangles, against 1 s), and as much memory as the mesh.
 const PLAIN: usize = 16;
 
 /// The lowest corner of a mesh, for one place after the other.
@@ -70,7 +70,7 @@ impl Footing {
 }
 
 impl Blocks {
-    /// Of the corners of `mesh`.
+    /// The blocks of the corners of `mesh`.
     fn of(mesh: &Mesh) -> Self {
         let mut used: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
         used.sort_unstable();

@@ -1,4 +1,4 @@
-//! What rays meet: the seam between the scene and the channel.
+//! Hits of rays: the seam between the scene and the channel.
 
 /// A half-line. The direction has unit length.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,8 +28,8 @@ pub trait CastRays: Send + Sync {
     fn cast(&self, ray: &Ray, nearest: f64, farthest: f64) -> Option<Hit>;
 }
 
-/// What the light of a band of shots meets, as columns; ordered by shot, then by ray, then by
-/// range. Truth: never handed to the receiver.
+/// Surfaces that the light of a band of shots meets, as columns; ordered by shot, then by ray, then by range.
+/// Truth: never handed to the receiver.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Hits {
     /// Index of the shot in the band's log.
@@ -50,7 +50,7 @@ pub struct Hits {
 }
 
 impl Hits {
-    /// The same hits by shot, of which there are `shots`; those of one shot stay in their order.
+    /// The same hits ordered by shot, for this number of `shots`; those of one shot stay in their order.
     pub(super) fn by_shot(self, shots: usize) -> Self {
         let mut next = vec![0_u32; shots + 1];
         self.shot.iter().for_each(|shot| next[*shot as usize + 1] += 1);

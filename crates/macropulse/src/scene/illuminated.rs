@@ -4,7 +4,7 @@
 //! 2. The point is kept if the sensor looks there and both stand on the same side of the surface.
 //! 3. A ray from the aperture to the point must meet nothing before it.
 //!
-//! Both lidars and everything else are where they are when the shot is fired; both ways together take a
+//! Both lidars and everything else are where they are when the shot is fired. Both ways together take a
 //! microsecond or two, in which a car moves by a tenth of a millimetre.
 
 use glam::DVec3;
@@ -51,9 +51,9 @@ impl Scene {
     /// The surfaces that the shots in `log`, fired by one lidar of a `pair`, illuminate and the other one, the
     /// sensor, sees. Neither the way there nor the way back is followed farther than `farthest`, m.
     ///
-    /// `line_of_sight` is given the number of the shot, the unit vector from the sensor to the
-    /// point in the frame of the sensor, and the length of both ways together, m; it gives the
-    /// pixel that looks there at that time, if there is one.
+    /// `line_of_sight` takes the number of the shot, the unit vector from the sensor to the point in the
+    /// frame of the sensor, and the length of both ways together, m. It returns the pixel that looks there at
+    /// that time, if there is one.
     pub fn illuminated(
         &self,
         pair: Pair<'_>,
@@ -76,7 +76,7 @@ impl Scene {
         light.finish()
     }
 
-    /// Whether nothing stands on `ray`, given in the world, between its origin and a point `distance`
+    /// Returns true if nothing stands on `ray`, given in the world, between its origin and a point `distance`
     /// metres away at `time_fs`.
     pub fn sees(&self, ray: &Ray, distance: f64, time_fs: i64) -> bool {
         self.cast_at(ray, time_fs, (0.0, distance - BEFORE)).is_none()
@@ -89,11 +89,11 @@ struct Light<'a> {
     pair: Pair<'a>,
     farthest: f64,
     line_of_sight: &'a LineOfSight<'a>,
-    /// When rays leave that are added now, fs.
+    /// Time at which rays that are added now leave, fs.
     now_fs: i64,
-    /// Where both lidars are then.
+    /// Poses of both lidars then.
     ends: Ends,
-    /// Where rays begin that are added now, in the frame of the interferer, m.
+    /// Place at which rays that are added now begin, in the frame of the interferer, m.
     begin: [f64; 3],
     packet: Packet,
     packet_hits: PacketHits,
@@ -144,7 +144,7 @@ impl<'a> Light<'a> {
     }
 
     /// The rays that are added from now on leave at `time_fs`, and begin at this place in the frame of the
-    /// interferer. Where either lidar moves, rays travel with those of their own time alone.
+    /// interferer. If either lidar moves, rays travel with those of their own time alone.
     fn leave_at(&mut self, time_fs: i64, begin: [f64; 3]) {
         let moved = self.pair.moves() && time_fs != self.now_fs;
         self.now_fs = time_fs;

@@ -1,4 +1,4 @@
-//! Whether the sensor stands inside something, where it would see little else.
+//! Finds objects that the sensor stands inside, where it would see little else.
 
 use glam::DVec3;
 
@@ -12,7 +12,7 @@ const DIRECTIONS: u32 = 64;
 const MOST_SURFACES: usize = 1000;
 
 impl Solid {
-    /// Whether `point`, in the world, lies inside. Nothing lies inside a plane.
+    /// Returns true if `point`, in the world, lies inside. Nothing lies inside a plane.
     fn holds(&self, point: [f64; 3]) -> bool {
         self.shape().holds(DVec3::from(self.pose().sensor_from_world().point(point)))
     }
@@ -26,10 +26,9 @@ pub(super) fn shapes_around(solids: &[Solid], point: [f64; 3]) -> Vec<u16> {
     objects
 }
 
-/// The objects among `meshes` that are met from `point`, in the world, in every one of 64
-/// directions spread evenly over the sphere. A mesh need not be free of gaps for that, nor its
-/// triangles turned the same way: a car is made of many sheets, so counting how often a ray
-/// crosses it says nothing.
+/// The objects among `meshes` that are met from `point`, in the world, in every one of 64 directions spread
+/// evenly over the sphere. A mesh need not be free of gaps for that, nor its triangles turned the same way. A
+/// car is made of many sheets, so counting how often a ray crosses it says nothing.
 pub(super) fn meshes_around(world: &impl CastRays, meshes: &[u16], point: [f64; 3]) -> Vec<u16> {
     let mut around: Option<Vec<u16>> = None;
     // The first points up, where most sensors see the sky.
@@ -74,7 +73,7 @@ mod tests {
     use super::super::Scene;
     use std::path::Path;
 
-    /// What the notes of a scene say of its sensor, which stands at `position`.
+    /// Returns the note of a scene on its sensor, which stands at `position`.
     fn told_in(folder: &Path, position: &str, more: &str) -> Option<String> {
         let text = format!("version = 1\n{more}\n[sensor]\nposition_m = {position}\n");
         let scene = Scene::from_toml(&text, "a.toml", folder).unwrap();

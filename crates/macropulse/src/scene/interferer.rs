@@ -27,9 +27,9 @@ const MOST_DRIFT: f64 = 1000.0;
 pub struct Interferer {
     /// Name, for reports.
     pub name: String,
-    /// What it is.
+    /// Its design.
     pub design: Design,
-    /// Where it is and looks, at any time.
+    /// Its place and attitude, at any time.
     pub motion: Motion,
     /// When it fires.
     pub clock: Clock,

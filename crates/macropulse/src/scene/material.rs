@@ -2,9 +2,9 @@
 //!
 //! A material of the library has its diffuse reflectance at some wavelengths, medians of open spectral
 //! libraries (\[ASTER\], \[SB\], docs/formats.md#materials says which). Between them it is linear, beyond
-//! them constant. What no library tells, lobes and retroreflective gains among it, are round
-//! engineering estimates for clean, dry surfaces, the same at every wavelength. Each can be overridden
-//! in a scene file, by one number for all wavelengths.
+//! them constant. Values that no library tells, lobes and retroreflective gains among them, are round
+//! engineering estimates for clean, dry surfaces, the same at every wavelength. Each can be overridden in a
+//! scene file, by one number for all wavelengths.
 
 /// A material: what surfaces are made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,9 +109,9 @@ impl Finish {
     /// angle between the normal and that place, `half_cosine` of that between the normal and the
     /// middle of both directions.
     ///
-    /// `ρ_eff = ρ_d·cos o + ρ_s·cosᵍ h`: the Lambertian part falls with the angle it is seen at, and
-    /// the lobe is that of [`Finish::backscatter`] \[Bli77\]. What a retroreflector sends back
-    /// goes to the source alone.
+    /// `ρ_eff = ρ_d·cos o + ρ_s·cosᵍ h`: the Lambertian part falls with the angle it is seen at, and the lobe
+    /// is that of [`Finish::backscatter`] \[Bli77\]. Light that a retroreflector sends back goes to the
+    /// source alone.
     pub fn scatter(&self, cosine: f64, half_cosine: f64) -> f64 {
         let [cosine, half_cosine] = [cosine, half_cosine].map(|cosine| cosine.abs().min(1.0));
         let lobe = match self.specular > 0.0 {
@@ -132,7 +132,7 @@ const FAINT: f64 = 1e-9;
 /// transmission.
 type Row = (&'static str, Diffuse, f64, f64, f64, f64);
 
-/// Name of the material that surfaces get of which nothing is known.
+/// Name of the material of surfaces about which nothing is known.
 pub const UNNAMED: &str = "unnamed";
 
 /// Retroreflective gain over white of sheeting with a coefficient of retroreflection of `r_a`

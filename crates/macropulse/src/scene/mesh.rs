@@ -32,8 +32,8 @@ impl Mesh {
         }
     }
 
-    /// The index of the material called `name`, which is added if it is new; `None` where there are
-    /// as many as can be counted.
+    /// The index of the material called `name`, which is added if it is new; `None` if no further one can be
+    /// counted.
     pub(super) fn material(&mut self, name: &str) -> Option<u16> {
         match self.material_names.iter().position(|known| known == name) {
             Some(index) => u16::try_from(index).ok(),

@@ -10,7 +10,7 @@ use super::footing::Footing;
 use super::mesh::Mesh;
 use super::readers::{Read, WithoutMaterials};
 
-/// What decides how a mesh comes out.
+/// Everything that decides how a mesh comes out.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Origin {
     Car,
@@ -50,7 +50,7 @@ pub(super) struct Known {
     pub footing: Footing,
     /// Length, width and height, m.
     pub size: [f64; 3],
-    /// What its file holds beside it, in sentences.
+    /// Further contents of its file, in sentences.
     pub left_out: Vec<String>,
 }
 

@@ -70,7 +70,7 @@ use coherence::Order;
 use file::{Place, Source};
 use world::{PacketHits, World};
 
-/// So many rays at most are put in order together.
+/// Most rays that are put in order together.
 const ORDERED: usize = 1 << 20;
 
 /// Number of places by which directions of lasers that take turns are fetched into the cache ahead: sixteen
@@ -210,10 +210,10 @@ impl Scene {
         self.world.cast_at(ray, time_fs, between)
     }
 
-    /// How far the nearest surface lies on each of many rays from one place in the world, given
-    /// by unit vectors, m; infinite where there is none before `farthest`. Several times as fast
-    /// as [`Scene::cast`], with the same ranges; fastest where neighbours in the list point nearly
-    /// the same way, for rays that do not are put in order first.
+    /// How far the nearest surface lies on each of many rays from one place in the world, given by unit
+    /// vectors, m; infinite where there is none before `farthest`. Several times as fast as [`Scene::cast`],
+    /// with the same ranges. It is fastest if neighbours in the list point nearly the same way, for rays that
+    /// do not are put in order first.
     pub fn cast_all(&self, origin: [f64; 3], directions: &[[f64; 3]], farthest: f64) -> Vec<f64> {
         let mut ranges = vec![f64::INFINITY; directions.len()];
         let from = (origin, farthest);

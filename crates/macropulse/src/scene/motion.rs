@@ -1,4 +1,4 @@
-//! Where something is at which time.
+//! Poses over time.
 
 use super::path::Waypoints;
 use super::pose::Pose;
@@ -41,7 +41,7 @@ impl Motion {
         }
     }
 
-    /// Whether the pose ever changes.
+    /// Returns true if the pose ever changes.
     pub fn moves(&self) -> bool {
         !matches!(self, Self::Still(_))
     }

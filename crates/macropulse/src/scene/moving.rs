@@ -49,7 +49,7 @@ impl MovingShape {
 }
 
 impl Mover {
-    /// A mesh of which nothing is farther than `reach` from the origin of its frame, m.
+    /// Returns a mesh that moves. All of it lies within `reach` of the origin of its frame, m.
     pub(super) fn mesh((model, reach): (Arc<Facets>, f64), object: u16, motion: Motion) -> Self {
         Self { body: Body::Mesh { model, object }, motion, reach: reach * (1.0 + WIDER) + WIDE }
     }
@@ -79,7 +79,7 @@ impl Mover {
         }
     }
 
-    /// Where a ray, given in the world, meets the body at `time_fs`, with a range in (`nearest`,
+    /// Returns the hit of a ray, given in the world, on the body at `time_fs`, with a range in (`nearest`,
     /// `farthest`).
     pub(super) fn cast(
         &self,

@@ -5,8 +5,8 @@ use super::rotation::Turn;
 
 /// Poses at ascending times.
 ///
-/// From each pose to the next it goes straight on at one speed, and turns about one axis at one rate, the
-/// shorter way: with the share s of the time between them that has passed,
+/// From each pose to the next it goes straight on at one speed. It turns about one axis at one rate, the
+/// shorter way. With s, the share of the time between both poses that has passed,
 ///
 /// p = p₀ + s·(p₁ − p₀), q = q₀·(q₀⁻¹·q₁)ˢ \[Sho85\]
 ///
@@ -67,7 +67,7 @@ mod tests {
         (time * FS_PER_S as f64).round() as i64
     }
 
-    /// Where `path` is at `time`, s, and where it looks.
+    /// Returns the position of `path` at `time`, s, and the direction in which it looks.
     fn state(path: &Waypoints, time: f64) -> (DVec3, DVec3) {
         let pose = path.at(seconds(time));
         let ahead = pose.world_from_sensor().direction([1.0, 0.0, 0.0]);
@@ -94,8 +94,8 @@ mod tests {
     }
 
     /// A banked turn on a circle of r = 30 m at ω = 0.5 rad/s, pitched and rolled throughout. A chord over
-    /// the time T leaves the arc by r·(1 − cos(ω·T/2)) at most, which a quarter of the steps makes 16 times
-    /// smaller; the attitude, about the vertical, is exact.
+    /// the time T leaves the arc by r·(1 − cos(ω·T/2)) at most. Steps of a quarter of the length make this 16
+    /// times smaller. The attitude, about the vertical, is exact.
     #[test]
     fn a_path_around_a_curve_leaves_it_by_the_sagitta() {
         let (radius, rate) = (30.0, 0.5);

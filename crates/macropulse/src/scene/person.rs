@@ -1,7 +1,7 @@
 //! A person, standing: balls, rounded poles and ellipsoids in the proportions of an adult.
 //!
-//! Heights of hip, shoulder and chin, the breadths of hip and shoulder and the length of an arm are
-//! shares of the stature \[DC66\]; how thick each part is, is ours.
+//! Heights of hip, shoulder and chin, breadths of hip and shoulder, and the length of an arm are shares of
+//! the stature \[DC66\]. The thickness of each part is our own choice.
 
 use std::ops::RangeInclusive;
 
@@ -15,14 +15,14 @@ pub(super) const HEIGHTS: RangeInclusive<f64> = 0.4..=2.6;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Part {
     pub shape: Shape,
-    /// Where its middle is in the frame of the object, m.
+    /// Position of its middle in the frame of the object, m.
     pub at: [f64; 3],
     /// The material of the library it is made of, where the file names none.
     pub material: Option<&'static str>,
 }
 
 impl Part {
-    /// Where it is in the world where the object is at `pose`.
+    /// Returns its pose in the world if the object is at `pose`.
     pub(super) fn pose(&self, pose: &Pose) -> Pose {
         if self.at == [0.0; 3] {
             return *pose;

@@ -21,9 +21,9 @@ pub(super) struct Placed {
     pub mesh: Rc<Mesh>,
     /// The scene's material for each of the mesh.
     pub material_indices: Vec<u16>,
-    /// Where it stands still.
+    /// Places at which it stands still.
     pub at: Vec<Transform>,
-    /// How it moves where it does not.
+    /// Motions of its copies that move.
     pub moving: Vec<Motion>,
     pub object: u16,
 }
@@ -62,13 +62,13 @@ impl Placed {
         lengths.filter(|length| length.is_finite()).fold(0.0, f64::max)
     }
 
-    /// Whether both are one model in two places.
+    /// Returns true if both are one model in two places.
     fn is_like(&self, other: &Self) -> bool {
         self.material_indices == other.material_indices
             && (Rc::ptr_eq(&self.mesh, &other.mesh) || self.mesh == other.mesh)
     }
 
-    /// Whether the `other` is known to be like it, without looking at their meshes.
+    /// Returns true if the `other` is known to be like it without a look at their meshes.
     pub(super) fn shares_with(&self, other: &Self) -> bool {
         Rc::ptr_eq(&self.mesh, &other.mesh) && self.material_indices == other.material_indices
     }

@@ -66,7 +66,7 @@ impl Cutter {
         Ok(())
     }
 
-    /// Whether a fan would not do; then `flat` is the polygon in its plane.
+    /// Returns true if no fan covers the polygon; then `flat` is the polygon in its plane.
     fn has_bay(&mut self, mesh: &Mesh, corners: &[u32]) -> bool {
         let Self { places, flat, .. } = self;
         places.clear();
@@ -81,7 +81,7 @@ impl Cutter {
         let fan = || places.windows(2).map(|edge| edge[0].cross(edge[1]));
         let area: DVec3 = fan().sum();
         let square = area.length_squared();
-        // What has no area, or is nowhere, has no plane.
+        // A polygon without area, or with a corner that is not finite, has no plane.
         let has_plane = square > 0.0 && square.is_finite();
         if !has_plane || fan().all(|one| one.dot(area) >= -ROUNDING * square) {
             return false;
@@ -96,9 +96,9 @@ impl Cutter {
 /// Polygons that a file tells before their corners, to be cut when those are there.
 #[derive(Default)]
 pub(super) struct Early {
-    /// Of all of them, one polygon behind the other.
+    /// Corners of all polygons, one polygon after the other.
     corners: Vec<u32>,
-    /// Of each: the line that tells it, how many corners it has, and its material.
+    /// Line in the file, number of corners and material of each polygon.
     polygons: Vec<(u32, u32, u16)>,
 }
 
@@ -198,8 +198,8 @@ mod tests {
     }
 
     proptest! {
-        /// A star about a point in a tilted plane, far from the origin: its triangles have its area
-        /// and its side, which those of a fan about a corner have not.
+        /// A star about a point in a tilted plane, far from the origin. Its triangles have its area and its
+        /// side. Those of a fan about a corner do not.
         #[test]
         fn triangles_cover_a_star_and_nothing_else(
             radii in proptest::collection::vec(0.1..1.0_f64, 4..60),

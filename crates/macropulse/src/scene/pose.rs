@@ -1,4 +1,4 @@
-//! Where something stands and how it is turned.
+//! Poses: where something stands and how it is turned.
 //!
 //! World frame: x forward, y left, z up, right-handed, metres (REP-103).
 

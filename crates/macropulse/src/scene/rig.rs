@@ -11,13 +11,13 @@ use crate::emit::Clock;
 pub struct Mount<'a> {
     /// Name, for reports.
     pub name: &'a str,
-    /// What it is.
+    /// Design of the lidar.
     pub design: &'a Design,
-    /// Where it is and looks, at any time.
+    /// Position and attitude at any time.
     pub motion: &'a Motion,
     /// When its first scan begins, and how fast its clock runs.
     pub begins: Clock,
-    /// Whether what it receives is recorded. Of an interferer the light alone counts.
+    /// True if what it receives is recorded. An interferer counts only for its light.
     pub records: bool,
 }
 
@@ -51,7 +51,7 @@ impl<'a> From<&'a Interferer> for Mount<'a> {
     }
 }
 
-/// Two lidars of a rig, of which one shines and the other one may receive it.
+/// Two lidars of a rig: one shines, and the other one may receive its light.
 #[derive(Debug, Clone, Copy)]
 pub struct Pair<'a> {
     /// The one that shines.
@@ -61,19 +61,19 @@ pub struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// Whether either of them moves.
+    /// Returns true if either of them moves.
     pub fn moves(&self) -> bool {
         self.from.motion.moves() || self.to.motion.moves()
     }
 
-    /// Where both are at `time_fs`.
+    /// Returns the poses of both at `time_fs`.
     pub fn at(&self, time_fs: i64) -> Ends {
         let [from, to] = [self.from, self.to].map(|end| End::of(end.motion, time_fs));
         Ends { from, to }
     }
 }
 
-/// Where both lidars of a [`Pair`] are at some time.
+/// Poses of both lidars of a [`Pair`] at some time.
 #[derive(Debug, Clone, Copy)]
 pub struct Ends {
     /// The one that shines.
@@ -82,7 +82,7 @@ pub struct Ends {
     pub to: End,
 }
 
-/// Where one of them is.
+/// Pose of one of them.
 #[derive(Debug, Clone, Copy)]
 pub struct End {
     /// Position in the world, m.

@@ -10,7 +10,7 @@ pub(crate) const PER_TRIANGLE: u64 = 220;
 /// Most triangles, however much memory there is.
 const MOST_TRIANGLES: usize = 1 << 26;
 
-/// So many vertices may stand beside those of triangles: of lines, or of no element at all.
+/// Vertices that may stand beside those of triangles: of lines, or of no element at all.
 const LOOSE_VERTICES: usize = 1 << 16;
 
 /// How many triangles may still be loaded. A file that holds more is refused while it is read, not when
@@ -27,19 +27,19 @@ impl Default for Room {
 }
 
 impl Room {
-    /// What fits into so many bytes.
+    /// Returns the room in this number of bytes.
     pub fn of_bytes(bytes: u64) -> Self {
         let triangles = usize::try_from(bytes / PER_TRIANGLE).unwrap_or(usize::MAX);
         Self { triangles: triangles.min(MOST_TRIANGLES) }
     }
 
-    /// What is left beside so many triangles.
+    /// Returns the room that is left beside this number of triangles.
     #[must_use]
     pub fn beside(self, triangles: usize) -> Self {
         Self { triangles: self.triangles.saturating_sub(triangles) }
     }
 
-    /// Refuses so many vertices and triangles, read of the file at `path`, if they do not fit.
+    /// Refuses these numbers of vertices and triangles, read from the file at `path`, if they do not fit.
     pub(super) fn check(
         self,
         (vertices, triangles): (usize, usize),

@@ -77,8 +77,8 @@ impl Rotation {
         [w, x, y, z]
     }
 
-    /// The turn about one axis that carries this rotation over to `other` the shorter way: its axis in
-    /// the frame of this rotation, and its angle, rad, from 0 to π.
+    /// Returns the turn about one axis that carries this rotation over to `other` the shorter way. The axis
+    /// is in the frame of this rotation; the angle, rad, is from 0 to π.
     pub(super) fn way_to(self, other: Self) -> Turn {
         let between = self.0.conjugate() * other.0;
         let (across, along) = (between.xyz().length(), between.w);

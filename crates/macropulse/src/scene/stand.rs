@@ -1,4 +1,4 @@
-//! Where something stands and how it moves, as it is typed and what that means.
+//! Poses and motions as people type them, and what they mean.
 
 use std::ops::RangeInclusive;
 
@@ -19,15 +19,15 @@ use crate::units::{fs_from_s, s_from_fs};
 /// Angles are no more than this, degrees: a hundred turns.
 const MOST_TURNED: f64 = 36_000.0;
 
-/// Times of a path, s from the beginning of the first scan: a run ends before the last one, and the time between the
-/// first and the last is a number of femtoseconds that 63 bits hold.
+/// Times of a path, s from the beginning of the first scan. A run ends before the last one. The femtoseconds
+/// between the first and the last fit into 63 bits.
 const TIMES: RangeInclusive<f64> = -100.0..=9000.0;
 
 /// `[sensor]`, and each entry of `copies`.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Stand {
-    /// Where it stands, m: x forward, y left, z up.
+    /// Position, m: x forward, y left, z up.
     pub position_m: Option<Spanned<Triple>>,
     /// Turn to the left, degrees.
     #[schemars(range(min = -36000, max = 36000))]
@@ -57,7 +57,7 @@ pub(super) struct WaypointTyped {
     /// Seconds since the first scan began.
     #[schemars(range(min = -100, max = 9000))]
     pub time_s: Spanned<f64>,
-    /// Where it is then, m: x forward, y left, z up.
+    /// Position at this time, m: x forward, y left, z up.
     pub position_m: Spanned<Triple>,
     /// Turn to the left, degrees.
     #[schemars(range(min = -36000, max = 36000))]
@@ -71,7 +71,7 @@ pub(super) struct WaypointTyped {
 }
 
 impl WaypointTyped {
-    /// Where it is.
+    /// Returns its pose as a [`Stand`].
     pub(super) fn stand(&self) -> Stand {
         Stand {
             position_m: Some(self.position_m.clone()),
@@ -84,7 +84,7 @@ impl WaypointTyped {
 }
 
 impl Source<'_> {
-    /// Where something stands and how it moves.
+    /// Returns the motion that `stand` describes.
     pub(super) fn motion(&self, stand: &Stand) -> Result<Motion, Error> {
         if let Some(path) = &stand.path {
             self.refuse_beside_path(stand)?;
@@ -171,7 +171,7 @@ impl Source<'_> {
         Ok(Waypoints::through(&poses))
     }
 
-    /// Where something stands.
+    /// Returns the pose that `stand` describes.
     pub(super) fn pose(&self, stand: &Stand) -> Result<Pose, Error> {
         let mut position = [0.0; 3];
         if let Some(typed) = &stand.position_m {

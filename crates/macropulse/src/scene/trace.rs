@@ -2,12 +2,12 @@
 //!
 //! 1. A beam without width is one ray. A beam with a width is a hexagonal set of rays, weighted
 //!    by the Gaussian irradiance at their place (docs/physics.md#footprint).
-//! 2. Where the mirror moves during a macropulse, it is cut into sub-macropulses that leave in
+//! 2. If the mirror moves during a macropulse, the macropulse is cut into sub-macropulses that leave in
 //!    different directions: each has rays of its own (docs/physics.md#mirror-motion).
 //! 3. A ray that meets glass leaves an echo there and goes on, weakened twice: on its way out and
 //!    on its way back. The glass does not bend it.
-//! 4. Where beams begin beside the origin of the sensor, so do their rays.
-//! 5. Where something moves, all rays of a shot are cast at the time at which it is fired.
+//! 4. If beams begin beside the origin of the sensor, so do their rays.
+//! 5. If something moves, all rays of a shot are cast at the time at which it is fired.
 
 use super::batch::Batch;
 use super::coherence;
@@ -17,8 +17,8 @@ use crate::emit::beam_axes;
 use macropulse_codec::ShotLog;
 
 impl Scene {
-    /// What the shots of `log` meet when they are fired, as far as light is followed, in the order
-    /// of the log. Ranges are those from where the sensor is at that time.
+    /// Returns the hits of the shots of `log` when they are fired, as far as light is followed, in the order
+    /// of the log. Ranges are counted from the position of the sensor at that time.
     pub fn trace(&self, design: &Design, log: &ShotLog) -> Traced {
         let directions = design.directions();
         let along = |shot: usize| directions.of_shot(log, shot);
@@ -41,7 +41,7 @@ impl Scene {
         axis: impl Fn(usize) -> [f64; 3],
     ) -> Hits {
         let footprint = Footprint::of(design);
-        // Where the sensor moves, each shot has a place of its own, and no neighbours.
+        // If the sensor moves, each shot has a place of its own, and no neighbours.
         let apart = design.directions().have_origins();
         let by_row = !self.sensor.moves()
             && (footprint.offsets.len() > 1 || self.world.is_fine() || apart)
@@ -49,7 +49,8 @@ impl Scene {
         self.trace_with((design, log), &footprint, axis, by_row)
     }
 
-    /// What all shots meet, cast row `by_row` or as they come, in the order of the log.
+    /// Returns the hits of all shots, in the order of the log. The shots are cast row by row if `by_row`,
+    /// otherwise as they come.
     #[inline(always)]
     fn trace_with(
         &self,
@@ -74,13 +75,13 @@ impl Scene {
     }
 }
 
-/// What the shots of a log have met.
+/// Hits of the shots of a log.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Traced {
-    /// What lies in the direction of each pixel. Its light, where the mirror stands still for a
-    /// macropulse; the truth to judge points by, where it moves.
+    /// Hits in the direction of each pixel. If the mirror stands still for a macropulse, its light comes from
+    /// them. If it moves, they are the truth to judge points by.
     pub middle: Hits,
-    /// What each of the [`SUB_MACROPULSES`] meets, the one sent first first; empty where the mirror
+    /// Hits of each of the [`SUB_MACROPULSES`] in the order in which they are sent; empty if the mirror
     /// stands still.
     pub sub_macropulses: Vec<Hits>,
 }
@@ -89,7 +90,7 @@ pub struct Traced {
 /// where the mirror moves.
 pub const SUB_MACROPULSES: u8 = 8;
 
-/// Where the beam points while the mirror moves on.
+/// Direction of the beam while the mirror moves on.
 struct Mirror<'a> {
     design: &'a Design,
     log: &'a ShotLog,
@@ -196,8 +197,8 @@ mod tests {
         }
     }
 
-    /// The mirror moves by 0.67 pixel during a macropulse of the paper: an edge that crosses a
-    /// pixel is met by some of its sub-macropulses, in the order in which they are sent.
+    /// The mirror moves by 0.67 pixel during a macropulse of the paper. An edge that crosses a pixel is met
+    /// by some of its sub-macropulses, in the order in which they are sent.
     #[test]
     fn the_parts_of_a_macropulse_sweep_two_thirds_of_a_pixel() {
         let design = Design::open("kim-park-2016-physical", &[]).unwrap();

@@ -1,4 +1,4 @@
-//! What single keys of a scene file mean, and what they may be: shapes, numbers.
+//! Meaning and limits of single keys of a scene file: shapes, numbers.
 
 use std::ops::Range;
 
@@ -10,12 +10,11 @@ use super::file::{ObjectTyped, ShapeTyped, Source};
 use super::person::{self, Part};
 use super::spanned::{Spanned, Triple};
 
-/// Coordinates and sizes are no more than this, m: 250 times round the Earth, so that a map
-/// may have its origin anywhere, and small enough for boxes in single precision, of which two sizes are
-/// multiplied.
+/// Coordinates and sizes are no more than this, m. It is 250 times round the Earth, so that a map may have
+/// its origin anywhere. It is small enough for boxes in single precision, which multiply two sizes.
 pub(super) const FARTHEST: f64 = 1e10;
 
-/// Whether `length` is a coordinate or a size that something may have.
+/// Returns true if `length` is a coordinate or a size that something may have.
 pub(super) fn is_length(length: f64) -> bool {
     length.abs() <= FARTHEST
 }

@@ -1,11 +1,11 @@
 //! All surfaces of a scene: triangles, copies of meshes, closed-form shapes. The nearest wins.
 //!
-//! There are three kinds. Unbounded planes are intersected with every ray. Other shapes, and copies
-//! of a mesh that occurs more than once, are found by a hierarchy over their bounding boxes. The
-//! triangles of all other meshes lie in one hierarchy, in the world. Of surfaces equally far away
-//! the shape wins that comes first in the scene file, then the copy, then the triangle.
+//! There are three kinds. Unbounded planes are intersected with every ray. Other shapes, and copies of a mesh
+//! that occurs more than once, are found by a hierarchy over their bounding boxes. The triangles of all other
+//! meshes lie in one hierarchy, in the world. Among surfaces equally far away, the shape that comes first in
+//! the scene file wins, then the copy, then the triangle.
 //!
-//! What moves is kept apart and asked after all that, ray by ray; of equally far surfaces it comes
+//! Surfaces that move are kept apart and met after all that, ray by ray. Among equally far surfaces they come
 //! last, in the order of the scene file.
 
 use std::sync::Arc;
@@ -35,7 +35,7 @@ pub(super) struct World {
     tree: Tree,
     /// Which one each leaf is.
     leaves: Vec<u32>,
-    /// What moves: shapes, then meshes.
+    /// Surfaces that move: shapes, then meshes.
     movers: Vec<Mover>,
 }
 
@@ -134,16 +134,16 @@ impl World {
         (self.facets.len() + models + moving, self.primitives.len() + self.movers.len())
     }
 
-    /// Whether a ray on its way down takes longer than to put it in order: with the city of
-    /// [`coherence`](super::coherence) half as long as before, with a car of 9 700 triangles and a
-    /// street of its copies up to 1.5 times as long.
+    /// Returns true if the descent of a ray takes longer than putting it in order. Order halves the time with
+    /// the city of [`coherence`](super::coherence). With a car of 9 700 triangles and a street of its copies,
+    /// the time grows to up to 1.5 times.
     pub(super) fn is_fine(&self) -> bool {
         let models: usize = self.models.iter().map(Facets::len).sum();
         self.facets.len() + models >= FINE
     }
 
-    /// What each ray of `packet` meets first at its own time, as [`World::cast_at`] has it; the
-    /// range of those that meet nothing stays.
+    /// Finds the first hit of each ray of `packet` at its own time, as [`World::cast_at`] does. The range of
+    /// a ray that meets nothing stays.
     #[inline]
     pub(super) fn cast_packet_at(
         &self,
@@ -176,8 +176,8 @@ impl World {
         }
     }
 
-    /// What each ray of `packet` meets first of what stands still; the range of those that meet
-    /// nothing stays.
+    /// Finds the first hit of each ray of `packet` on surfaces that stand still. The range of a ray that
+    /// meets nothing stays.
     pub(super) fn cast_packet(&self, packet: &mut Packet, hits: &mut PacketHits) {
         hits.primitive = [NONE; LANES];
         let PacketHits { primitive, face, .. } = hits;
@@ -227,7 +227,7 @@ impl World {
     ) {
         let mut limit = packet.range;
         for lane in 0..LANES {
-            // Of two equally far the lower rank wins, whichever comes first.
+            // If two are equally far, the lower rank wins, whichever is met first.
             if primitive[lane] != NONE && index < primitive[lane] {
                 limit[lane] = limit[lane].next_up();
             }
@@ -335,14 +335,14 @@ pub(super) struct PacketHits {
     /// Index of the primitive that is hit, and its face or its leaf; [`NONE`] where none is.
     primitive: Lanes<u32>,
     face: Lanes<u32>,
-    /// What a ray hits that has [`MOVER`] for a primitive.
+    /// Hit of a ray whose primitive is [`MOVER`].
     moving: Lanes<Option<Hit>>,
     waiting: Waiting,
     inner: Waiting,
 }
 
 impl PacketHits {
-    /// Whether the ray of a lane hits any surface.
+    /// Returns true if the ray of a lane hits any surface.
     #[inline]
     pub(super) fn is_hit(&self, packet: &Packet, lane: usize) -> bool {
         packet.leaf[lane] != NONE || self.primitive[lane] != NONE

@@ -14,7 +14,7 @@ pub(crate) struct Misfit {
     pub fault: Fault,
 }
 
-/// What does not fit.
+/// A part of a table that does not fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Fault {
     /// The last step of the place is a key that is not among the known ones.

@@ -10,7 +10,7 @@ use super::misfit::{Fault, Misfit, Walk};
 use crate::names::{line_column, span_of};
 use crate::told;
 
-/// What a `table` says, as a `T`.
+/// Reads a `table` as a `T`.
 ///
 /// # Errors
 /// The first place that does not fit.
@@ -20,8 +20,8 @@ pub(crate) fn read<T: DeserializeOwned + JsonSchema>(table: &Table) -> Result<T,
         .map_err(|error: toml::de::Error| misfit::<T>(table, error.message()))
 }
 
-/// The first place of a `table` that does not fit a `T`. What the schema does not know, the reader
-/// `said`.
+/// Returns the first place of a `table` that does not fit a `T`. If the schema finds none, the fault is what
+/// the reader `said`.
 fn misfit<T: JsonSchema>(table: &Table, said: &str) -> Misfit {
     let table = Value::Table(table.clone());
     let checked = Walk::default().value(super::of_reader::<T>().as_value(), &table);
@@ -37,11 +37,11 @@ pub struct Refusal {
     pub span: Range<usize>,
     /// The key or the element of a list, as `object[0].shape`; empty for the text as a whole.
     pub path: String,
-    /// What is wrong, in one sentence.
+    /// The fault in one sentence.
     pub message: String,
 }
 
-/// What a TOML `text` says, as a `T`.
+/// Reads a TOML `text` as a `T`.
 ///
 /// # Errors
 /// Its first fault: it is no TOML, or something in it does not fit.
@@ -64,10 +64,10 @@ pub fn read_text<T: DeserializeOwned + JsonSchema>(text: &str) -> Result<T, Refu
     })
 }
 
-/// What the TOML `text` of a file called `origin` says, as a `T`.
+/// Reads the TOML `text` of a file called `origin` as a `T`.
 ///
 /// # Errors
-/// Where it is wrong, and how, in one sentence.
+/// The place and the kind of its first fault, in one sentence.
 pub fn read_file<T: DeserializeOwned + JsonSchema>(text: &str, origin: &str) -> Result<T, String> {
     read_text(text).map_err(|Refusal { span, path, message }| {
         let (line, column) = line_column(text, span.start);

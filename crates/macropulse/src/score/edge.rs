@@ -7,8 +7,9 @@ use crate::scene::{Hits, Traced};
 
 use super::NEAR;
 
-/// What is `judged` of a return of `shot`, unless it is wrong or false and lies within [`NEAR`] of
-/// a surface in the `gate` that a part of the macropulse met: then that surface, as an edge.
+/// Returns the surface of a return of `shot`, as `judged` unless the return is an edge. A wrong or false
+/// return is an edge if a part of the macropulse met a surface in the `gate` within [`NEAR`] of it. Its
+/// surface is then that one.
 ///
 /// The beam sweeps a part of a pixel during a macropulse (docs/physics.md#mirror-motion). Its parts
 /// are traced for the light, so no ray is cast here, and a range at which no light came back stays
@@ -50,7 +51,7 @@ pub fn surface(hits: &Hits, at: usize, outcome: Outcome) -> Surface {
 mod tests {
     use super::*;
 
-    /// What one shot meets at a `range`.
+    /// Returns the hit of one shot at a `range`.
     fn met(shot: u32, range: f64) -> Hits {
         Hits {
             shot: vec![shot],

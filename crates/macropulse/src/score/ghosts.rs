@@ -1,9 +1,9 @@
 //! Ghosts: returns that interferers have made.
 //!
-//! A **ghost** is a return that came out wrong or false, and of whose marks, as many as were found
-//! at their place, at least half are places where a mark of an interferer arrives. A place and a
-//! mark are the same if they lie within one tick, three standard deviations of the jitter and the
-//! longer micropulse of both.
+//! A **ghost** is a wrong or false return that marks of interferers can have made. They arrive at places of
+//! its code word: at least half the number of marks that the return was found with. A place and a mark are
+//! the same if they lie within one tick, three standard deviations of the jitter and the longer micropulse of
+//! both.
 
 use std::ops::Range;
 
@@ -119,7 +119,7 @@ mod tests {
         let mut piece = Piece::of(&design, &scale, &log, &answered);
         piece.points.truth.returns.push(Surface { outcome, ..Surface::NONE });
         let tof_fs = fs_from_s(tof_from_range(30.0));
-        // What the interferer sends is what we send, without its last marks.
+        // The interferer sends what we send, without its last marks.
         let transmitters = vec![Transmitter::of(&design, 1.0); 2];
         let mut light = Light { transmitters, ..Light::default() };
         light.trains.push(PulseTrain {

@@ -1,9 +1,9 @@
 //! Intervals in which a true value lies with 95 % confidence.
 //!
-//! What is repeated is the seed: the pixels of one scan share the surfaces they look at, the marks
-//! that fall on each other and the search of the receiver, so they are no independent trials; two
-//! seeds are. Every interval here therefore takes its scatter from seed to seed. It is conditional
-//! on the scene: other surfaces are not part of the chance.
+//! The seed is repeated. The pixels of one scan are no independent trials: they share the surfaces they look
+//! at, the marks that fall on each other and the search of the receiver. Two seeds are independent. Every
+//! interval here therefore takes its scatter from seed to seed. It is conditional on the scene: other
+//! surfaces are not part of the chance.
 
 use macropulse_codec::statistics::student_95;
 
@@ -34,15 +34,15 @@ impl Estimate {
     /// `n* = n / d · (z/t)²`, `d = max(1, v·n / (p(1 − p)))`,
     /// `v = m/(m − 1) · Σ(xⱼ − p·nⱼ)² / n²`,
     ///
-    /// where m is the number of seeds, v the variance of p as the scatter between seeds shows it,
-    /// d how many times larger that is than for independent trials, z the quantile of the normal
-    /// distribution and t that of Student's with m − 1 degrees of freedom, which pays for v being
+    /// Here m is the number of seeds, and v the variance of p as the scatter between seeds shows it. The
+    /// factor d says how many times larger v is than for independent trials. The quantiles are z of the
+    /// normal distribution and t of Student's with m − 1 degrees of freedom. Student's pays for v being
     /// estimated from few seeds. So
     ///
     /// - pixels that fail together widen the interval as they should, and Student's interval over
     ///   the means of the seeds would say about the same;
-    /// - yet it stays within \[0, 1\], is skewed near its ends, and keeps a width where not one hit
-    ///   was met or missed and the scatter is 0; there the trials count as independent;
+    /// - yet it stays within \[0, 1\] and is skewed near its ends. It keeps a width if not one hit was met or
+    ///   missed and the scatter is 0: the trials then count as independent;
     /// - it is never narrower than Wilson's own: scatter that is small by luck does not count, nor
     ///   does the smaller one of pixels that differ among themselves.
     ///
@@ -91,7 +91,7 @@ impl Estimate {
     }
 }
 
-/// As many independent trials as `counts` are worth, see [`Estimate::of_rate`].
+/// Returns the number of independent trials that `counts` are worth, see [`Estimate::of_rate`].
 fn effective_trials(counts: &[[f64; 2]], value: f64, trials: f64) -> f64 {
     let seeds = counts.len() as f64;
     if counts.len() < 2 {
@@ -181,7 +181,7 @@ mod tests {
         (covered - 0.95 * TRIALS as f64) / (0.95 * 0.05 * TRIALS as f64).sqrt()
     }
 
-    /// A scan of 400 pixels of which each run of `together` comes out alike.
+    /// Returns hits and pixels of a scan of 400 pixels. The pixels of each run of `together` come out alike.
     fn scan(chance: &mut ChaCha8Rng, truth: f64, together: u64) -> [u64; 2] {
         let runs = (0..400 / together).filter(|_| chance.random_bool(truth)).count() as u64;
         [together * runs, 400]

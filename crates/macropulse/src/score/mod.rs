@@ -75,11 +75,10 @@ impl Score {
 
 /// Compares the returns of a band with what its owned shots met, and writes the truth beside them.
 ///
-/// A return is right if any surface along its beam lies within the sensor's tolerance: behind
-/// glass there are several. Where the mirror moves during a macropulse, a part of it may meet a
-/// surface that the middle of it misses: a return from there is an edge. The truth written is
-/// that of the surface the return came from; of the first one met where none fits. A pixel comes
-/// out as the return does that its image shows.
+/// A return is right if any surface along its beam lies within the sensor's tolerance: behind glass there are
+/// several. If the mirror moves during a macropulse, a part of the macropulse may meet a surface that its
+/// middle misses: a return from there is an edge. The truth written is that of the surface the return came
+/// from; of the first one met where none fits. A pixel comes out as the return does that its image shows.
 pub fn judge(
     piece: &mut Piece,
     design: &Design,

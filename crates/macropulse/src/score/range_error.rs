@@ -23,15 +23,16 @@ const WITHIN: f64 = 4.0;
 const DOUBLINGS: usize = 8;
 
 impl RangeError {
-    /// Of the right points that the image of `cloud` shows, pixel by pixel, so that rounding is the same
-    /// whatever order they came in. Ranges are `f32`: at 150 m they are kept to 8 µm.
+    /// Returns the error of the right points that the image of `cloud` shows. They are summed pixel by pixel,
+    /// so that rounding is the same whatever order they came in. Ranges are `f32`: at 150 m they are kept to
+    /// 8 µm.
     pub fn of(cloud: &PointCloud) -> Self {
         Self::of_errors(&errors(cloud, |outcome| outcome == Outcome::Right))
     }
 
-    /// As [`RangeError::of`], but of the whole spread where it is cut off by `limit`, the error up
-    /// to which a point is right: the limit is doubled until it holds four deviations of what
-    /// it lets in. So it is the deviation that a link budget forecasts.
+    /// As [`RangeError::of`], but for the whole spread if `limit`, the error up to which a point is right,
+    /// cuts it off. The limit is then doubled until it holds four deviations of what it lets in. The
+    /// deviation is then the one that a link budget forecasts.
     pub fn of_spread(cloud: &PointCloud, limit: f64) -> Self {
         let right = Self::of(cloud);
         let met = [Outcome::Right, Outcome::Near, Outcome::Wrong];
@@ -58,7 +59,7 @@ impl RangeError {
         }
     }
 
-    /// Whether errors up to a `limit` leave out next to nothing of what is spread like these.
+    /// Returns true if errors up to a `limit` leave out next to nothing of a spread like this.
     fn is_held_by(&self, limit: f64) -> bool {
         self.deviation.is_none_or(|deviation| WITHIN * deviation <= limit)
     }

@@ -1,5 +1,5 @@
-//! What comes to a detector in the time of one shot, for people who ask why the shot was decided as
-//! it was. Truth: no receiver is given it.
+//! Light and detection events at a detector in the time of one shot, for people who ask why the shot was
+//! decided as it was. Truth: no receiver is given it.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::design::PARTS_OF_TICK;
 use crate::detect::Memory;
 use crate::emit::Band;
 
-/// Where and when to look.
+/// A detector and a stretch of time to look at.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stretch {
     /// Channel of the detector.
@@ -31,7 +31,7 @@ pub struct Arrivals {
     pub background: f64,
 }
 
-/// What one shot brings along one way.
+/// Light of one shot along one way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arrival {
     /// Whose light it is: 0 the sensor itself, then the interferers.
@@ -44,7 +44,8 @@ pub struct Arrival {
     pub marks: Vec<f64>,
 }
 
-/// What comes in `stretch` of the time of `band`, whose log has the shots of all that light.
+/// Returns light and detection events in `stretch` of the time of `band`, whose log has the shots of all that
+/// light.
 pub(super) fn arrivals(setup: &Setup, band: &Band, stretch: &Stretch) -> Arrivals {
     let Setup { seen, detectors } = setup;
     let design = seen.design;

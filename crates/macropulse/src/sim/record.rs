@@ -1,13 +1,13 @@
-//! What the receiver is given of a band: the part of one continuous stream of ticks, or of samples, that
-//! belongs to it, so that who has the stream alone, from a file or from hardware, can cut the same out of
-//! it. Samples depend on nothing but light and noise of their time, and those of two bands that overlap
-//! are the same. Of ticks:
+//! The record of a band, as its receiver is given it: the part of one continuous stream of ticks, or of
+//! samples, that belongs to it. Whoever has the stream alone, from a file or from hardware, can cut the same
+//! out of it. Samples depend on nothing but light and noise of their time, and those of two bands that
+//! overlap are the same. Ticks follow these rules:
 //!
-//! A band owns the ticks from where its own begin to where those of the next band do. Behind them it
-//! is given those of the next band, as far as light of its shots may arrive. These come out of the
-//! band's own simulation as they do of the next one's where an event depends on nothing but the
-//! light that makes it, for all of that is in both. Where it may depend on more, cells that were
-//! blind or converters that were busy, the beginning of the next band is simulated as it will be.
+//! A band owns the ticks from the beginning of its own to the beginning of the next band's. Behind them it is
+//! given those of the next band, as far as light of its shots may arrive. If an event depends on nothing but
+//! the light that makes it, these come out of both bands' simulations alike, for all of that light is in
+//! both. If it may depend on cells that were blind or converters that were busy, the beginning of the next
+//! band is simulated as it will be.
 
 use macropulse_codec::{Given, ShotLog, Tick, Ticks};
 
@@ -19,9 +19,9 @@ use crate::tdc::{self, Converted, Wanted};
 
 /// The record of a band.
 pub(super) struct Recorded {
-    /// What the receiver is given beside its shot log.
+    /// Input of the receiver beside its shot log.
     pub given: Given,
-    /// What was counted on the way.
+    /// Counts taken on the way.
     pub tally: Tally,
 }
 
@@ -35,8 +35,8 @@ pub(super) fn of(setup: &Setup, band: &Band) -> (ShotLog, Given) {
     (design.known(&log), recorded.given)
 }
 
-/// What the detectors and the readout make of the `light` of the shots of `log`, those of `band` with its guard
-/// shots, in a scan of which it is `known` that so many converters were busy at once.
+/// Returns the record that the detectors and the readout make of the `light` of the shots of `log`: those of
+/// `band` with its guard shots. In its scan, `known` converters are known to have been busy at once.
 pub(super) fn recorded(
     setup: &Setup,
     memory: &mut Memory,
@@ -81,12 +81,12 @@ fn light<'a>(setup: &Setup<'a>, log: &ShotLog) -> Light<'a> {
     channel::light(&setup.seen, log, &scene.trace(design, log))
 }
 
-/// What the converters make of the light of the shots of `log`.
+/// Returns the output of the converters for the `light` of the shots of `log`.
 fn converted(setup: &Setup, memory: &mut Memory, (log, light): (&ShotLog, &Light)) -> Converted {
     tdc::ticks(setup.seen.design, setup.detectors.response(log, light, memory), Wanted::ALL)
 }
 
-/// Leaves of what was `converted` of a band, with its guard shots, the ticks that belong to it.
+/// Drops from `converted` the ticks of the guard shots that do not belong to the band.
 fn cut(
     setup: &Setup,
     memory: &mut Memory,
@@ -101,7 +101,7 @@ fn cut(
         return;
     }
     let next = band.next(design).shot_log(design);
-    // What is fired while gates are open of shots whose light is looked at.
+    // Shots fired before the last gate closes of any shot whose light is looked at.
     let closes_fs = seen.end * design.clock.tick_fs + design.cut().listening_fs;
     let shots = next.fired_at_fs.partition_point(|fired| *fired <= closes_fs);
     let next = next.part(0..shots);

@@ -8,8 +8,8 @@ use crate::kernels::{all_apart, distinct};
 /// Detection events looked at together.
 const BLOCK: usize = 512;
 
-/// Converters served first-free, each busy for the same time: an event finds one free unless as
-/// many events as there are converters were taken within the last dead time.
+/// Converters served first-free, each busy for the same time. An event finds one free unless each of them
+/// took an event within the last dead time.
 #[derive(Debug)]
 pub(super) struct Bank {
     pub converters: usize,
@@ -39,9 +39,9 @@ impl Bank {
     /// Takes the events of `block`, which are apart; all before it were taken. Gives where those taken
     /// end.
     ///
-    /// If each of them is a dead time later than the one `peak` places before it, no more than
-    /// `peak` converters are busy at any of them: all are taken, and there is no new peak. Few
-    /// blocks are different.
+    /// If each of them is a dead time later than the one `peak` places before it, no more than `peak`
+    /// converters are busy at any of them. Then all are taken, and there is no new peak. Few blocks are
+    /// different.
     fn take_block(&mut self, ticks: &mut [u32], block: Range<usize>) -> usize {
         let is_free = self.peak > 0
             && block.start.checked_sub(self.peak).is_some_and(|back| {
@@ -78,8 +78,8 @@ impl Bank {
         busy.end
     }
 
-    /// Whether an event at `now` finds a converter free. Of `taken` those in the range `busy` may
-    /// still be.
+    /// Returns true if an event at `now` finds a converter free. Those events of `taken` in the range `busy`
+    /// may still keep one busy.
     fn takes(&mut self, now: u32, taken: &[u32], busy: &mut Range<usize>) -> bool {
         while busy.start < busy.end && now - taken[busy.start] >= self.dead {
             busy.start += 1;

@@ -1,9 +1,9 @@
 //! Marks to ticks where nothing but marks makes events.
 //!
-//! Macropulses follow each other with pauses in between, and one that no other comes near needs no
-//! second look: no two of its marks share a tick, and how many converters it keeps busy is known
-//! from its code word. Only where macropulses overlap are their marks merged, and only where that
-//! may keep more converters busy than ever before are they counted.
+//! Macropulses follow each other with pauses in between. One that no other comes near needs no second look:
+//! no two of its marks share a tick, and its code word gives the number of converters it keeps busy. Only
+//! where macropulses overlap are their marks merged, and only where that may keep more converters busy than
+//! ever before are they counted.
 
 use macropulse_codec::Ticks;
 
@@ -73,9 +73,9 @@ struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    /// Adds the first of `macropulses`, the first of which is near nothing before, as long as each
-    /// begins after the `dead` time of those before, and if not `several`, only one with marks. Gives
-    /// how many those were, and the last one with marks.
+    /// Adds `macropulses` from the first one on, as long as each begins after the `dead` time of those
+    /// before. The first one must be near nothing before. If not `several`, only one with marks is added.
+    /// Returns how many were added, and the last one with marks.
     fn add_run(
         &mut self,
         macropulses: &[Macropulse],
@@ -97,7 +97,7 @@ impl Layout<'_> {
         (run, last)
     }
 
-    /// Whether the marks of `next` begin within the `dead` time of the last tick.
+    /// Returns true if the marks of `next` begin within the `dead` time of the last tick, or if it has none.
     fn is_near(&self, next: &Macropulse, dead: u32) -> bool {
         match (self.words.ends(next), self.ticks.last()) {
             (Some([begins, _]), Some(last)) => begins < last.saturating_add(dead),

@@ -6,7 +6,7 @@
 //! 2. Detection events within the same tick are one: the hard limiter.
 //! 3. The first free converter takes the next event and is busy for the dead time. With all of
 //!    them busy the event is lost.
-//! 4. Where every detector has its own channel, the bank is divided evenly among them.
+//! 4. If every detector has its own channel, the bank is divided evenly among them.
 
 mod bank;
 mod marks;
@@ -18,12 +18,12 @@ use bank::Bank;
 use crate::design::{Clock, Design};
 use crate::detect::{Detections, Response};
 
-/// What the bank of converters makes of the detection events of a band.
+/// Output of the bank of converters for the detection events of a band.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Converted {
-    /// What the receiver is given.
+    /// Ticks that the receiver is given.
     pub ticks: Ticks,
-    /// Ticks that were made, those among them that nobody wanted.
+    /// Ticks that were made, including those that nobody wanted.
     pub made: u64,
     /// Most converters busy at once, in any one channel; no less than was known before.
     pub peak_busy: u32,
@@ -33,7 +33,7 @@ pub struct Converted {
     pub merged: u64,
 }
 
-/// What one converter puts out for one detection event.
+/// Output of one converter for one detection event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reading {
     /// Whole clock periods since power-up, rolling over in 32 bits.
@@ -59,11 +59,11 @@ impl Reading {
     }
 }
 
-/// What is known and wanted of a band before its ticks are made.
+/// Request for the ticks of a band, and what is known before they are made.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
-    /// Converters that were busy at once in other bands of its scan, 0 where none was measured: only more of
-    /// them are new, and most of a band is converted without looking for fewer.
+    /// Most converters that were busy at once in other bands of its scan, 0 if none was measured. Only a
+    /// larger number is new, and most of a band is converted without looking for smaller ones.
     pub known_busy: u32,
     /// The absolute tick from which on ticks are wanted: earlier ones may be left out, and are where that
     /// saves time.
@@ -75,8 +75,8 @@ impl Wanted {
     pub const ALL: Self = Self { known_busy: 0, from: i64::MIN };
 }
 
-/// What is `wanted` of the `response` of the detectors to one band, in the memory that it had; nothing where
-/// the sensor has no converters.
+/// Returns what is `wanted` of the `response` of the detectors to one band, in the memory that it had;
+/// nothing if the sensor has no converters.
 pub fn ticks<'a>(design: &Design, response: impl Into<Response<'a>>, wanted: Wanted) -> Converted {
     let Some(share) = design.bank() else { return Converted::default() };
     let converters = share.converters as usize;
@@ -137,8 +137,7 @@ mod tests {
         assert_eq!((merged, lost), (1, 0));
     }
 
-    /// What the converters put out says the same as the time since the epoch, even if the counter
-    /// rolls over on the way.
+    /// The reading of a converter gives the time since the epoch, even if the counter rolls over on the way.
     #[test]
     fn the_counter_rolls_over_unnoticed() {
         let clock = sensor(&[]).clock;
@@ -206,7 +205,8 @@ mod tests {
         &ALONE
     }
 
-    /// A sensor with a bank of so many converters. Reading its file for each takes a second for twenty.
+    /// Returns a sensor with this bank of converters. It reuses one sensor: reading the file for each takes a
+    /// second for twenty.
     fn with_bank(converters: u32, dead_fs: i64) -> Design {
         let mut design = sensor_alone().clone();
         design.readout = Readout::Tdc(Tdc { converters, dead_fs });

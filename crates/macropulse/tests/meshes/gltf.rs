@@ -116,7 +116,7 @@ fn nodes_that_contain_each_other_or_have_two_parents_are_refused() {
     refused("a.gltf", Square { nodes: &nodes, ..Square::default() }.text());
 }
 
-/// A copy of the square of which one corner is elsewhere, and a surface that is nothing else.
+/// A copy of the square with two corners elsewhere, and a surface whose other corners are all zero.
 #[test]
 fn sparse_accessors_are_read() {
     let mut bytes = buffer();

@@ -31,7 +31,7 @@ fn refused(name: &str, bytes: impl AsRef<[u8]>) -> String {
     told
 }
 
-/// Whether a ray down on (x, y) meets something of a mesh with z up.
+/// Returns true if a ray down on (x, y) meets something of a mesh with z up.
 fn is_covered(scene: &Scene, [x, y]: [f64; 2]) -> bool {
     scene.cast(&Ray { origin: [x, y, 50.0], direction: [0.0, 0.0, -1.0] }, 0.0, 100.0).is_some()
 }

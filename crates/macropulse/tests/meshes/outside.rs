@@ -58,7 +58,7 @@ fn a_mesh_names_files_in_the_folder_of_the_scene() {
     let escaped = ("a.gltf", "%2e%2e/..%2Fa.bin");
     assert!(scene(around.path(), "", escaped).is_err(), "escaped, it is the same");
     assert!(scene(around.path(), "outside_files = true\n", escaped).is_ok());
-    // What is refused is not even looked for.
+    // A file that is refused is not even looked for.
     let told = scene(around.path(), "", ("a.obj", "/nowhere/at/all.mtl")).map(|_| ()).unwrap_err();
     assert!(told.contains("lies outside"), "{told}");
 }
@@ -91,7 +91,7 @@ fn a_scene_names_meshes_anywhere() {
     assert_eq!(scene.materials[0].at(905e-9).diffuse, 0.25);
 }
 
-/// Where the object brings a material the file with materials is not opened at all.
+/// If the object brings a material, the file with materials is not opened at all.
 #[test]
 fn what_is_not_needed_is_not_read() {
     let around = around();

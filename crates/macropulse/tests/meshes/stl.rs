@@ -58,7 +58,7 @@ fn words_may_be_in_capitals_and_apart_by_tabs() {
 fn a_binary_file_may_begin_with_solid() {
     assert_eq!(triangles("a.stl", binary(b"solid exported by a program", 4, 0.0)), 4);
     assert_eq!(triangles("a.stl", binary(b"solid\n facet \n", 4, 0.0)), 4);
-    // What follows the facets does not count.
+    // Bytes behind the facets do not count.
     let more = [binary(b"solid x", 4, 0.0), b"colours".to_vec()].concat();
     assert_eq!(triangles("a.stl", more), 4);
     let cut = &binary(b"solid x", 4, 0.0)[..250];

@@ -21,7 +21,7 @@ pub const COLUMNS: u32 = 848;
 /// Farthest round trip, in chips.
 pub const GATE: u32 = 400_277;
 
-/// What the pixel at (row, column) sees: its round trip in chips, if anything.
+/// Round trip, in chips, of the surface that the pixel at (row, column) sees, if any.
 pub type Scene = fn(u32, u32) -> Option<i64>;
 
 /// A bright box in front of falling ground, sky above.
@@ -50,7 +50,7 @@ pub fn sky(_: u32, _: u32) -> Option<i64> {
     None
 }
 
-/// What the light meets on its way to the ticks.
+/// Disturbances of the light on its way to the ticks.
 #[derive(Debug, Clone, Copy)]
 pub struct Weather {
     /// Share of the marks that is seen.
@@ -190,13 +190,13 @@ impl Sensor {
 pub struct Score {
     /// Shots that met something and carried light.
     pub echoes: u32,
-    /// Of these, found within four chips.
+    /// Echoes that were found within four chips.
     pub right: u32,
-    /// Of these, found elsewhere.
+    /// Echoes that were found elsewhere.
     pub wrong: u32,
     /// Shots that met nothing.
     pub empty: u32,
-    /// Of these, those that have an answer nevertheless.
+    /// Empty shots that have an answer nevertheless.
     pub false_returns: u32,
     /// Mean and root mean square of the range error of the right ones, in chips.
     pub bias: f64,

@@ -18,7 +18,7 @@ impl Chance {
         ((u128::from(mixed(self.state)) * u128::from(n)) >> 64) as u32
     }
 
-    /// Puts `things` into an order of which every one is equally likely.
+    /// Shuffles `things`: every order is equally likely.
     pub fn shuffle<T>(&mut self, things: &mut [T]) {
         for last in (1..things.len()).rev() {
             things.swap(last, self.below(last as u32 + 1) as usize);

@@ -1,8 +1,7 @@
 //! Quadratic congruence codes: in block k the chip a·k·(k+1)/2 mod p is lit.
 //!
-//! The distance of neighbouring marks grows by the same step from block to block, so no two of
-//! them are the same: shifted against itself, a word meets itself in two marks at most, where a
-//! prime word meets itself in p − 1.
+//! The distance of neighbouring marks grows by the same step from block to block, so no two distances are the
+//! same. Shifted against itself, a word meets itself in two marks at most, a prime word in p − 1.
 
 use super::super::CodeWord;
 use super::prime::one_mark_per_block;

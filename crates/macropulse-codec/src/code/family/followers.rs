@@ -1,9 +1,9 @@
 //! Words that follow each other, where a channel is blind for a time behind each mark that it sends.
 //!
-//! An echo of a word comes while its own marks or later words are sent. It loses two marks at once where a
-//! distance between two of them and one between two marks that are sent differ by less than the time for which
-//! the channel is blind, here the least distance `gap`. As many shifts of the echo, in chips, do that as there
-//! are in
+//! An echo of a word comes while its own marks or later words are sent. It loses two marks at once at some
+//! shift if a distance between two of them differs by less than `gap` from one between two marks that are
+//! sent. The least distance `gap` stands here for the time for which the channel is blind. The number of such
+//! shifts of the echo, in chips, is
 //!
 //! E = Σ over words i, k = 0 … `later`, and distances d of word i and d' of word i + k: max(0, gap − |d − d'|).
 //!
@@ -14,8 +14,8 @@ use super::super::CodeWord;
 use super::chance::Chance;
 use super::separated::{Separated, word};
 
-/// Work at most, 40 ms: places looked at for marks, and pairs of distances compared. Of 10 words of 3 marks that
-/// keep 20 chips to two followers all are found in 360 chips by seven seeds of ten, in 400 by nine.
+/// Work at most, 40 ms: places looked at for marks, and pairs of distances compared. With 10 words of 3 marks
+/// that keep 20 chips to two followers, all are found in 360 chips by seven seeds of ten, in 400 by nine.
 const MOST_WORK: u64 = 1 << 23;
 
 /// The `words` of `family`, some of them drawn anew so that an echo loses two marks at fewer shifts.
@@ -95,7 +95,7 @@ impl Turns<'_> {
         (0..word.len()).map(|d| self.overlap(&word[d..=d], &word[d + 1..])).sum()
     }
 
-    /// To the words behind it, in so many of which it is not itself.
+    /// The same of a word to each of the `later` words behind it, but not to itself.
     fn behind(&self, at: usize) -> u64 {
         let follower = |later: usize| (at + later) % self.words.len();
         let others = (1..=self.family.later as usize).map(follower).filter(|other| *other != at);
@@ -122,8 +122,8 @@ mod tests {
     use super::super::Family;
     use super::*;
 
-    /// At how many shifts, in chips, and of how many `words` together, an echo loses two marks to its own word or
-    /// to one of those that are sent `later` at most: none is best.
+    /// Counts the shifts, in chips, of all `words` together at which an echo loses two marks to its own word
+    /// or to one sent up to `later` words after it. Zero is best.
     fn counted(family: &Separated, words: &[CodeWord]) -> u64 {
         Turns { family, words: words.iter().map(distances).collect() }.all()
     }
@@ -131,8 +131,8 @@ mod tests {
     const WORDS: Separated =
         Separated { length: 360, weight: 3, words: 10, gap: 20, apart: 5, later: 2, seed: 1 };
 
-    /// At how many shifts, of all words together, two marks fall behind marks of the word so many later, or, of
-    /// none later, behind others than themselves; counted mark by mark.
+    /// Counts, mark by mark, the shifts of all words together at which two marks fall behind marks of the
+    /// word `later` places on. If `later` is 0, they fall behind other marks of their own word.
     fn lost(words: &[CodeWord], later: usize, gap: i32) -> usize {
         let is_lost = |at: usize, shift: i32| {
             let sent = &words[(at + later) % words.len()].marks;
@@ -162,7 +162,7 @@ mod tests {
         assert!(lost(&alone, 1, 20) > 0 && lost(&alone, 2, 20) > 0);
     }
 
-    /// Where there is too little room few are lost. Control: the same words in the other order lose more.
+    /// With too little room, few echoes are lost. Control: the same words in another order lose more.
     #[test]
     fn in_short_words_few_are_lost() {
         for seed in 1..6 {

@@ -24,10 +24,11 @@ pub(super) fn johnson_bound(length: u32, weight: u32) -> u32 {
     length.saturating_sub(1) / (weight * weight.saturating_sub(1)).max(1)
 }
 
-/// How many words the search finds of `wanted`, or of as many as there may be.
+/// Returns the number of words that the search finds, asked for `wanted` or, without that, for all there may
+/// be.
 ///
 /// # Errors
-/// Where there cannot be so many words, or the search finds fewer than `wanted`, or none.
+/// If there cannot be that many words, or the search finds fewer than `wanted`, or none.
 pub(super) fn found(length: u32, weight: u32, wanted: Option<u32>) -> Result<u32, Error> {
     super::checked_length(length, weight)?;
     // A single mark has no distances, and every word of it is the same one.
@@ -43,7 +44,7 @@ pub(super) fn found(length: u32, weight: u32, wanted: Option<u32>) -> Result<u32
     Ok(found)
 }
 
-/// The first `wanted` words the search finds, or as many as it does.
+/// Returns the words that the search finds, `wanted` at most.
 pub(super) fn words(length: u32, weight: u32, wanted: u32) -> Vec<CodeWord> {
     let mut best: Vec<Vec<u32>> = Vec::new();
     for round in 0..ROUNDS {

@@ -1,19 +1,19 @@
-//! Words of which all distances between marks differ: optical orthogonal codes \[CSW89\] of words in time,
-//! not in a circle, for detectors that cannot tell one chip from the next.
+//! Words with all distances between marks different: optical orthogonal codes \[CSW89\] of words in time, not
+//! in a circle, for detectors that cannot tell one chip from the next.
 //!
 //! Let D be the distances from each mark of a word to each later one, of all words together. Every one of
-//! them is `gap` chips or more, and any two are `apart` chips or more from each other. Where two marks
-//! of one word meet two of another, or of itself shifted, a distance is the same: so no more than one mark
-//! does, even of pulses that are up to `apart` chips long. A channel is taken to be blind for a `gap` behind
-//! each mark that it sends: an echo loses two marks to that at no range, where there is room, and else at few
-//! ([`super::followers`]).
+//! them is `gap` chips or more, and any two are `apart` chips or more from each other. If two marks of one
+//! word met two of another, or of itself shifted, two distances would be the same. So no more than one mark
+//! meets another, even of pulses that are up to `apart` chips long. A channel is taken to be blind for a
+//! `gap` behind each mark that it sends. An echo loses two marks to that at no range, if there is room, and
+//! else at few ([`super::followers`]).
 
 use std::sync::{Mutex, PoisonError};
 
 use super::super::{CodeWord, Error};
 use super::{chance::Chance, followers};
 
-/// Words drawn at random of which all distances between marks differ.
+/// Words drawn at random, with all distances between marks different.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Separated {
     /// Chips of a word, 1 to 65535: the marks lie within.
@@ -22,13 +22,13 @@ pub struct Separated {
     pub weight: u32,
     /// Number of words, 1 to 4096.
     pub words: u32,
-    /// Every distance between marks of a word is so many chips at least.
+    /// Least distance between marks of a word, in chips.
     pub gap: u32,
-    /// And differs by so many at least from every other one.
+    /// Least difference between any two of the distances, in chips.
     pub apart: u32,
     /// Up to how many words later an echo of a word may come, 0 to 16: the shots of a channel in flight.
     pub later: u32,
-    /// What the words are drawn by.
+    /// Seed of the words.
     pub seed: u64,
 }
 
@@ -44,9 +44,9 @@ const MOST_LATER: u32 = 16;
 /// Places looked at at most, for each mark that there is: half a second.
 const MOST_LOOKED_AT: u64 = 1 << 25;
 
-/// How often a word is begun anew where the last marks find no room, and how often the family is. Of 3 marks
-/// in 238 chips, 20 and 5 apart, ten words are found by two beginnings in three, eleven by one in five;
-/// with so many beginnings twelve by four seeds of twenty, and thirteen by none.
+/// Number of times that a word is begun anew if the last marks find no room, and that the family is. With 3
+/// marks in 238 chips, 20 and 5 apart, two beginnings in three find ten words, and one in five finds eleven.
+/// With this number of beginnings, four seeds of twenty find twelve, and none finds thirteen.
 const TRIES: u32 = 32;
 
 /// The families that were drawn last, the last one at the end. A search of designs asks for the same one hundreds of times,
@@ -58,7 +58,7 @@ const MOST_KNOWN: usize = 16;
 
 type Found = Result<Vec<CodeWord>, Error>;
 
-/// As many words as were asked for.
+/// Returns all the words that were asked for.
 pub(super) fn found(family: &Separated) -> Found {
     let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, found)) = known().iter().find(|(known, _)| known == family) {
@@ -86,7 +86,7 @@ fn found_anew(family: &Separated) -> Found {
     if later > MOST_LATER {
         return Err(Error::Later { later, possible: MOST_LATER });
     }
-    // So many distances must lie apart; more tries do not help where they cannot.
+    // All distances must lie apart; if there is no room for them, more tries do not help.
     let distances = u64::from(words) * u64::from(weight) * u64::from(weight - 1) / 2;
     let room = u64::from(length.saturating_sub(gap)) / u64::from(apart.max(1)) + 1;
     for attempt in 0..if distances <= room { TRIES } else { 0 } {
@@ -245,7 +245,7 @@ mod tests {
         assert!(told(Separated { weight: 65, ..D2 }).contains("65 marks"));
         assert!(told(Separated { words: 5000, ..D2 }).contains("5000 words"));
         assert!(told(Separated { gap: 300, ..D2 }).contains("0 of 10"));
-        // As many distances as there is just room for are searched for, and not found.
+        // There is just room for the distances of 14 words: they are searched for, and not found.
         assert!(told(Separated { words: 14, ..D2 }).contains("of 14 words"));
     }
 }

@@ -16,8 +16,8 @@ const DEGREES: std::ops::RangeInclusive<u32> = 3..=15;
 /// Degrees of Gold codes that have a preferred pair here and words of bearable number.
 const GOLD_DEGREES: [u32; 6] = [5, 6, 7, 9, 10, 11];
 
-/// v takes every so many chips of u: 2^k + 1 with k = 2, which has no divisor in common with an
-/// odd n, and 2 with an even one that 4 does not divide.
+/// Step in u from one chip of v to the next: 2^k + 1 with k = 2. The greatest common divisor of k and n is 1
+/// for an odd n, and 2 for an even one that 4 does not divide.
 const DECIMATION: usize = 5;
 
 pub(super) fn checked_degree(degree: u32) -> Result<u32, Error> {

@@ -1,8 +1,7 @@
 //! Random sparse codes: each word has its marks at chips drawn for it.
 //!
-//! So many words may be drawn that no two shots that can meet share one. Nothing is guaranteed of
-//! a word but its weight; words of few marks in many chips hardly ever coincide in more than a
-//! handful.
+//! Enough words can be drawn for no two shots that can meet to share one. Nothing is guaranteed of a word but
+//! its weight. Words of few marks in many chips hardly ever coincide in more than a handful.
 
 use std::collections::BTreeSet;
 
@@ -22,9 +21,9 @@ pub struct Sparse {
     pub weight: u32,
     /// Number of words, 1 to 65535.
     pub words: u32,
-    /// From each mark to the next there are so many chips at least; 1 leaves them as they fall.
+    /// Least distance from each mark to the next, in chips; 1 leaves them as they fall.
     pub gap: u32,
-    /// What the words are drawn by.
+    /// Seed of the words.
     pub seed: u64,
 }
 
@@ -37,7 +36,7 @@ impl Sparse {
     }
 }
 
-/// That there are so many chips, marks and words.
+/// Checks the numbers of chips, marks and words, and the gap.
 pub(super) fn checked(sparse: &Sparse) -> Result<(), Error> {
     let &Sparse { length, weight, words, gap, .. } = sparse;
     super::checked_length(length, weight)?;
@@ -66,7 +65,7 @@ pub(super) fn word(sparse: &Sparse, index: u32) -> CodeWord {
             marks.insert(last as u16);
         }
     }
-    // What the gaps take is put back behind each mark.
+    // The chips that the gaps take are put back behind each mark.
     let apart = |(before, mark): (u32, u16)| mark + (before * (gap - 1)) as u16;
     CodeWord { length, marks: (0..).zip(marks).map(apart).collect() }
 }
@@ -80,9 +79,9 @@ mod tests {
         Family::sparse(Sparse { length, weight, words, gap: 1, seed })
     }
 
-    /// H0: with gaps, too, every set of marks is drawn equally often. Of 7 chips, 3 marks at least
-    /// 2 apart leave the 10 sets of 3 in 5. N = 20 000, seed 3: χ² has 9 degrees of freedom,
-    /// α = 10⁻⁴ is 33.7. Negative control: ten sets of which one is drawn twice as often.
+    /// H0: with gaps, too, every set of marks is drawn equally often. With 3 marks at least 2 apart, 7 chips
+    /// leave the 10 sets of 3 in 5. N = 20 000, seed 3: χ² has 9 degrees of freedom, α = 10⁻⁴ is 33.7.
+    /// Negative control: one of the ten sets is drawn twice as often.
     #[test]
     fn marks_keep_their_gap_and_all_sets_are_alike() {
         let sparse = Sparse { length: 7, weight: 3, words: 20_000, gap: 2, seed: 3 };
@@ -114,10 +113,10 @@ mod tests {
         assert!(many.iter().all(|w| w.weight() == 8 && w.marks.is_sorted_by(|a, b| a < b)));
     }
 
-    /// H0: every chip is lit equally often. N = 20 000 words of 4 in 20 chips, seed 9: χ² of 20
-    /// counts, each with a share of 1/5 of the words, has 19 degrees of freedom once divided by
-    /// 1 − (w − 1)/(n − 1) = 16/19 for marks that exclude each other; α = 10⁻⁴ is χ² < 51.9.
-    /// Negative control: without the last chip it is far beyond.
+    /// H0: every chip is lit equally often. N = 20 000 words of 4 in 20 chips, seed 9. Each of the 20 counts
+    /// has a share of 1/5 of the words. As marks exclude each other, χ² has 19 degrees of freedom once
+    /// divided by 1 − (w − 1)/(n − 1) = 16/19. α = 10⁻⁴ is χ² < 51.9. Negative control: with a tenth of the
+    /// last chip's marks missing it is beyond.
     #[test]
     fn marks_fall_on_every_chip_alike() {
         let sparse = Sparse { length: 20, weight: 4, words: 20_000, gap: 1, seed: 9 };

@@ -1,23 +1,24 @@
-//! Whether chance would fit what is lit to the marks of a macropulse.
+//! Test whether chance would fit the lit chips to the marks of a macropulse.
 //!
-//! What is lit in a gate is light of other shots, which comes in runs as long as a macropulse and in
-//! step with it where shots leave on the chip clock, and noise. How dense it is at which lags is not known;
-//! how much is lit at each is seen. So that is taken as given, and only how it falls on marks and dark
-//! chips is left to chance. Of n lit of N marks and M dark chips X are marks, hypergeometrically:
+//! The light in a gate is light of other shots, and noise. Light of other shots comes in runs as long as a
+//! macropulse, and in step with it if shots leave on the chip clock. The density of light at each lag is not
+//! known, but the number of lit chips is seen. So that number is taken as given, and only how it falls on
+//! marks and dark chips is left to chance. If n of N marks and M dark chips are lit, the number X of lit
+//! marks is hypergeometric:
 //! P(X ≥ x) = Σ_k≥x C(N, k)·C(M, n − k)/C(N + M, n).
 //!
-//! 1. n* is the least number of lit chips at which all may be marks and that be no chance:
-//!    L(n*)·P(X = n*) ≤ α, L(n) being the lags of the gate about which at least n chips are lit, and α the
-//!    false returns accepted.
-//! 2. X marks and Y dark chips are believed where X − Y ≥ n* and L(n*)·P(X' ≥ X) ≤ α.
+//! 1. n* is the least number of lit chips that may all be marks without being chance: L(n*)·P(X = n*) ≤ α.
+//!    L(n) is the number of lags of the gate about which at least n chips are lit, and α the false returns
+//!    accepted.
+//! 2. X marks and Y dark chips are believed if X − Y ≥ n* and L(n*)·P(X' ≥ X) ≤ α.
 //!
-//! Each of the L(n*) lags where that can happen is believed by chance with α/L(n*) at most: α in the
-//! gate, whatever is in it. A gate where nothing else is lit asks for less than one full of light.
+//! Each of the L(n*) lags where that can happen is believed by chance with α/L(n*) at most: α in the gate,
+//! whatever is in it. A gate where nothing else is lit asks for less than one full of light.
 
 use crate::kernels::Balance;
 use crate::statistics::hypergeometric_tail;
 
-/// What is accepted, and what is remembered of each number of marks.
+/// Limits of the test, and the results known so far for each number of marks.
 #[derive(Debug)]
 pub(super) struct Chance {
     /// Lags of a gate.
@@ -34,7 +35,7 @@ pub(super) struct Chance {
 }
 
 impl Chance {
-    /// For gates of so many `lags` and macropulses of so many `chips`.
+    /// Creates the test for gates of `lags` lags and macropulses of `chips` chips.
     pub fn new(lags: f64, false_alarm: f64, chips: u32) -> Self {
         Self { lags, false_alarm, chips, least: Vec::new(), counts: Vec::new() }
     }
@@ -44,8 +45,8 @@ impl Chance {
         self.least_of(marks)[0]
     }
 
-    /// Whether chance would not leave the balance `peak` of so many `marks`; `lit_about` tells at how
-    /// many lags of the gate how many chips are lit, from so many on.
+    /// Returns true if chance would not leave the balance `peak` of `marks` marks. `lit_about` counts the
+    /// lags of the gate by the number of chips lit about them, from a least number on.
     pub fn is_unlikely(
         &mut self,
         marks: u32,
@@ -63,7 +64,7 @@ impl Chance {
             return true;
         }
         lit_about(alone, &mut self.counts);
-        // From here on the lags about which at least so many are lit.
+        // Lags about which `lit` chips or more are lit, for each `lit` from here on.
         let mut lags: u32 = self.counts.iter().sum();
         for (lit, count) in (alone..=score).zip(&self.counts) {
             if f64::from(lags) * self.of_all(marks, lit) <= self.false_alarm {
@@ -74,7 +75,7 @@ impl Chance {
         false
     }
 
-    /// The least balances of so many `marks`.
+    /// Returns the least balances of `marks` marks.
     fn least_of(&mut self, marks: u32) -> [u32; 2] {
         if self.least.len() <= marks as usize {
             self.least.resize(marks as usize + 1, [0; 2]);

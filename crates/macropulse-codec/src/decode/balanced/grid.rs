@@ -25,13 +25,13 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Nothing, with so many ticks per chip, and where a tick lights as many places before its own as
-    /// a mark may be late.
+    /// Creates an empty grid of `scale` ticks per chip. A tick also lights the `late` places before its own,
+    /// as a mark may be late by that.
     pub fn new((scale, late): (i64, i64)) -> Self {
         Self { origin: 0, end: 0, scale, late, width: 0, words: Vec::new(), before: Vec::new() }
     }
 
-    /// Whether all of `span` is at hand.
+    /// Returns true if all of `span` is at hand.
     pub fn covers(&self, span: &Range<i64>) -> bool {
         self.origin <= span.start && span.end <= self.end
     }
@@ -64,7 +64,7 @@ impl Grid {
         }
     }
 
-    /// What is lit if a macropulse begins at tick `start`.
+    /// Returns the marks and the dark chips that are lit if a macropulse begins at tick `start`.
     pub fn at(&self, start: i64, chips: &Chips) -> Option<Balance> {
         let (phase, chip) = self.place(start)?;
         best_balance(self.phase(phase), chip..chip + 1, chips, i32::MIN)
@@ -84,7 +84,7 @@ impl Grid {
             let places = self.places_of(phase, &starts);
             let Some(found) = self.best_of_phase(phase, places, (chips, least)) else { continue };
             let start = self.origin + self.scale * found.place as i64 + phase;
-            // Of equals the earliest counts, whichever phase it is at.
+            // The earliest of equals counts, whichever phase it is at.
             if found.score() > least || start < better {
                 (least, better) = (found.score(), start);
                 best = Some((start, found));
@@ -103,8 +103,8 @@ impl Grid {
         sides.into_iter().filter_map(best).map(Balance::score).max().unwrap_or(0)
     }
 
-    /// At how many of `starts` a macropulse of these `chips` would have how many chips lit, marks or not,
-    /// where at least so many are: `counts[lit - least]`.
+    /// Counts the `starts` by the number of chips, marks or not, that a macropulse of these `chips` would
+    /// have lit there, from `least` on: `counts[lit - least]`.
     pub fn lit_about(
         &self,
         starts: &Range<i64>,

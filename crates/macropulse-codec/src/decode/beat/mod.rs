@@ -1,14 +1,14 @@
 //! Beats to returns: the receiver of frequency-modulated light.
 //!
-//! Light that comes back is mixed with that which is sent while its frequency goes up, and then while it goes down
-//! again. After the time of flight τ it lags behind by γ·τ, γ being the slope of the ramp, and light of a surface that
-//! approaches is higher by the Doppler shift D = 2·v/λ \[AB01\]. The beats are
+//! Light that comes back is mixed with the light that is sent, while its frequency goes up and then while it
+//! goes down. After the time of flight τ it lags behind by γ·τ, γ being the slope of the ramp. Light of a
+//! surface that approaches is higher by the Doppler shift D = 2·v/λ \[AB01\]. The beats are
 //!
 //! f_up = γ_up·τ − D, f_down = γ_down·τ + D.
 //!
-//! Each shot is decoded by itself. A peak of the rising ramp and one of the falling ramp give a range and a radial
-//! velocity. Both come of one surface if their powers together are more than noise makes of any two peaks. Of several
-//! surfaces the strongest peaks of both ramps belong together.
+//! Each shot is decoded by itself. A peak of the rising ramp and one of the falling ramp give a range and a
+//! radial velocity. Both come of one surface if their powers together are more than noise makes of any two
+//! peaks. If there are several surfaces, the strongest peaks of both ramps belong together.
 
 mod check;
 mod window;
@@ -225,10 +225,10 @@ impl BeatMethod {
 
     /// Powers of its peaks together from which on a return is one, in units of the mean of noise.
     ///
-    /// The powers of noise in different bins are independent exponential variables. Those of a pair exceed γ each and x
-    /// together, x ≥ 2γ, with the probability e⁻ˣ·(1 + x − 2γ), γ being the least power that is recorded. As many pairs
-    /// of bins are tried as lie in the area of the plane of both beats that the gate, Δτ long, and all Doppler shifts
-    /// ΔD have: Δτ·ΔD·(B_up·T_down + B_down·T_up).
+    /// The powers of noise in different bins are independent exponential variables. Those of a pair exceed γ
+    /// each and x together, x ≥ 2γ, with the probability e⁻ˣ·(1 + x − 2γ), γ being the least power that is
+    /// recorded. The number of pairs of bins that are tried is an area in the plane of both beats. The gate,
+    /// Δτ long, and all Doppler shifts ΔD span it: Δτ·ΔD·(B_up·T_down + B_down·T_up).
     pub fn threshold(&self, gate_fs: (i64, i64)) -> f64 {
         let gate = s_from_fs(gate_fs.1.saturating_sub(gate_fs.0));
         let least = self.least_power;

@@ -13,14 +13,14 @@ use crate::Peak;
 pub enum SpectralWindow {
     /// None: the most signal, and strong beats that leak far into other bins.
     None,
-    /// (1 + cos(2πt/T))/2 about the middle of the ramp: a strong beat leaks into a few bins only; a third of the signal
-    /// is lost to the noise, and a beat is measured 1.53 times less precisely.
+    /// (1 + cos(2πt/T))/2 about the middle of the ramp. A strong beat leaks into a few bins only. A third of
+    /// the signal is lost to the noise, and a beat is measured 1.53 times less precisely.
     Hann,
 }
 
 impl SpectralWindow {
-    /// The windowed bin is a sum over bins without a window: the factor of the bin itself, and of each of its two
-    /// neighbours, noise of the power 1 keeping it.
+    /// Returns the factors in the windowed bin, a sum over bins without a window: that of the bin itself, and
+    /// that of each of its two neighbours. Noise of the power 1 keeps it.
     ///
     /// Phases are counted from the middle of the ramp.
     pub fn weights(self) -> [f64; 2] {

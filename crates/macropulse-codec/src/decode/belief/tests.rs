@@ -177,8 +177,8 @@ proptest! {
     }
 }
 
-/// Of 13 bits with 29 marks each, half of them seen where it is lit, the label is contradicted by two lit bits more or
-/// less, and not by its own light. Two marks of a bit do not tell.
+/// A payload has 13 bits with 29 marks each, and half the marks of a lit bit are seen. Two lit bits more or
+/// less contradict the label, and its own light does not. Two marks of a bit do not tell.
 #[test]
 fn light_of_another_label_contradicts() {
     let around = Surroundings { lit: 5.0, places: 5000.0, density: 1e-3 };
@@ -228,7 +228,7 @@ struct Toy {
 const LAGS: usize = 12;
 
 impl Toy {
-    /// So many `shots`, each mark in a random place, all from one seed.
+    /// Creates `shots` shots, each mark in a random place, all from one seed.
     fn new(shots: usize, seed: u64) -> Self {
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let mut some = || chance.next_u64() & chance.next_u64();
@@ -308,9 +308,9 @@ fn the_verdict_does_not_depend_on_the_order_of_hypotheses() {
     assert!(others > 200, "{others}");
 }
 
-/// N = 2000 bands that propose whatever they like, seeds 0 to 1999: each ends in no more rounds than there are pairs, and
-/// one more, with the returns that it has if no verdict is kept from round to round. In more than one in ten a return was taken back. Negative control: of those that end, no more than half
-/// do in ten rounds.
+/// N = 2000 bands that propose whatever they like, seeds 0 to 1999. Each ends after at most one round more
+/// than there are pairs, with the returns that it has if no verdict is kept from round to round. In more than
+/// one in ten a return was taken back. Negative control: no more than half of them end in ten rounds.
 #[test]
 fn accepting_and_taking_back_ends() {
     let (mut early, mut taken_back) = (0, 0);

@@ -38,10 +38,10 @@ impl Chance {
     /// > Λ = Σ n_i·w_i, w_i = ln(1 − f + f·p_i/q_i),
     ///
     /// a sum over N independent counts. By Chernoff's bound no more than e^(−Λ) of all histograms without a
-    /// pulse reach it. The tail is below that bound by the share d/((1 − e^(−d))·σ·√(2π)) \[BR60\], σ² being
-    /// the variance of Λ with the pulse and d the largest step by which a count raises it. Where counts are
-    /// many this is the normal tail, where they are few that of the binomial distribution. How bright the
-    /// background is need not be known, as N is given.
+    /// pulse reach it. The tail is below that bound by the share d/((1 − e^(−d))·σ·√(2π)) \[BR60\]. Here σ²
+    /// is the variance of Λ with the pulse, and d the largest step by which a count raises Λ. For many counts
+    /// this is the normal tail, for few that of the binomial distribution. The brightness of the background
+    /// need not be known, as N is given.
     ///
     /// Counts of a bin whose variance is v times its mean weigh 1/v.
     pub fn of(model: &Model, step: i64) -> Self {
@@ -90,9 +90,9 @@ impl Chance {
     /// Whole standard deviations beyond the threshold at which `false_alarm` returns of a histogram are
     /// false; `None` below it.
     ///
-    /// The filter of all lags of the gate, `places` bins, rises through a level x as often as that of x·r/√(2π) lags a
-    /// bin that are independent, r being the roughness of the pulse \[Rice44\]; here x = √(2Λ). No more
-    /// than the two lags a bin that are looked at count.
+    /// The gate has `places` bins. The filter rises through a level x as often as x·r/√(2π) independent lags
+    /// per bin exceed it \[Rice44\]. Here r is the roughness of the pulse, and x = √(2Λ). At most two lags
+    /// per bin count, as no more are looked at.
     pub fn margin(&self, kernel: &Kernel, places: f64, false_alarm: f64) -> Option<u16> {
         // Evidence that is no number is none.
         if !(self.evidence > 0.0 && self.photons.is_finite()) {
@@ -109,9 +109,9 @@ impl Chance {
     }
 }
 
-/// The share f of `all` counts that a pulse most likely has, at which Σ n_i·(r_i − 1)/(1 − f + f·r_i)
-/// is 0, r_i being the ratio of a bin, and 0 outside the pulse; 0 if there is no excess. The sum falls
-/// with f.
+/// Returns the share f of `all` counts that a pulse most likely has; 0 if there is no excess. It is the zero
+/// of Σ n_i·(r_i − 1)/(1 − f + f·r_i), which falls with f. Here r_i is the ratio of a bin, and 0 outside the
+/// pulse.
 fn likeliest(bins: &[Bin], all: f64) -> f64 {
     let inside: f64 = bins.iter().map(|bin| bin.count).sum();
     let (mut low, mut high) = (0.0, 1.0);

@@ -1,4 +1,4 @@
-//! What the receiver makes of one pulse in counts that are made up, for forecasts.
+//! The receiver's decision on one pulse in made-up counts, for forecasts.
 
 use super::chance::Chance;
 use super::model::Model;
@@ -34,8 +34,8 @@ pub struct Stretch {
 }
 
 impl Decision {
-    /// How `method` decides in histograms of so many `bins`, each `bin_fs` long, with a gate `gate_fs`; `None` if its
-    /// pulse has no kernel in such bins.
+    /// Returns the decisions of `method` in histograms of `bins` bins, each `bin_fs` long, with the gate
+    /// `gate_fs`. `None` if its pulse has no kernel in such bins.
     pub fn new(
         method: &HistogramMethod,
         (bin_fs, bins): (i64, u32),

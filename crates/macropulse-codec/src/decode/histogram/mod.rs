@@ -95,9 +95,9 @@ impl HistogramReceiver {
 /// `saturated` says that every laser pulse had been counted before the histogram ended.
 ///
 /// # Errors
-/// If a setting is outside its limits, columns differ in length, the log is out of order, or a detector
-/// that stops at its first photon counted more photons than laser pulses. A histogram in which nothing
-/// is found is no error: it is counted as [`Reject::NoPeak`].
+/// If a setting is outside its limits, columns differ in length, or the log is out of order. Also if a
+/// detector that stops at its first photon counted more photons than laser pulses. A histogram in which
+/// nothing is found is no error: it is counted as [`Reject::NoPeak`].
 pub fn decode(
     receiver: &HistogramReceiver,
     log: &ShotLog,

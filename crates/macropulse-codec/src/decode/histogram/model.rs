@@ -103,8 +103,8 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Background and photons of greatest likelihood with the pulses where they are, by expectation and
-    /// maximisation: each count is shared out among them as they are expected to have made it.
+    /// Fits background and photons by maximum likelihood with the pulses where they are. This is expectation
+    /// and maximisation: each count is shared out among them as they are expected to have made it.
     fn fit(&mut self) {
         let Exposed { count, exposure, .. } = self.exposed;
         let seen: f64 = exposure.iter().sum();
@@ -182,9 +182,9 @@ impl<'a> Model<'a> {
         gain
     }
 
-    /// The lag at which the likelihood is greatest, in bins: the vertex of a parabola through the best
-    /// step and those beside it. Where it is as high over several steps, as of a pulse much shorter than
-    /// a bin, the middle of these.
+    /// Returns the lag at which the likelihood is greatest, in bins: the vertex of a parabola through the
+    /// best step and those beside it. If several steps are equally high, as for a pulse much shorter than a
+    /// bin, it is the middle of these.
     fn vertex(&self, at: usize) -> f64 {
         let light = self.lights[at];
         let rest = self.without(at);

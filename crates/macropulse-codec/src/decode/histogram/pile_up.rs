@@ -13,13 +13,13 @@ pub enum PileUp {
     Coates,
 }
 
-/// Mean number of photons per laser pulse in each bin, from the `counts` of `cycles` laser pulses of
-/// which each stops the detector at its first photon \[Coa68\]:
+/// Returns the mean number of photons per laser pulse in each bin, from the `counts` of `cycles` laser
+/// pulses. Each of these stops the detector at its first photon \[Coa68\]:
 ///
 /// > λ_i = −ln(1 − h_i/(M − Σ_{k<i} h_k)),
 ///
-/// h_i being the count of bin i and M the cycles. In the bin in which the last cycle is counted half a cycle is taken
-/// as left, as infinitely many photons are not; behind it all are 0.
+/// h_i being the count of bin i and M the cycles. In the bin in which the last cycle is counted half a cycle
+/// is taken as left, as the rate would be infinite otherwise. All bins behind it are 0.
 pub fn coates(counts: &[u32], cycles: u32) -> Vec<f64> {
     let exposed = Exposed::of(counts, cycles, PileUp::Coates);
     let rate = |(count, exposure): (&f64, &f64)| match *exposure > 0.0 {
@@ -29,11 +29,11 @@ pub fn coates(counts: &[u32], cycles: u32) -> Vec<f64> {
     exposed.count.iter().zip(&exposed.exposure).map(rate).collect()
 }
 
-/// Counts that are Poisson variables of mean λ·e: λ photons would be counted in all cycles if none hid
-/// another, and a share e of the cycles was still waiting for its photon.
+/// Counts that are Poisson variables of mean λ·e. All cycles together would count λ photons if none hid
+/// another. A share e of the cycles was still waiting for its photon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exposed {
-    /// Of each bin.
+    /// Count of each bin.
     pub count: Vec<f64>,
     /// Share e of each bin.
     pub exposure: Vec<f64>,
@@ -42,12 +42,12 @@ pub struct Exposed {
 }
 
 impl Exposed {
-    /// The `counts` of `cycles` laser pulses; those that are counted in one bin after another are
-    /// missing in the next, if each stops the detector.
+    /// Takes the `counts` of `cycles` laser pulses. If each count stops the detector, the cycles counted in
+    /// one bin are missing in the next.
     ///
-    /// Given what came before, the count h of a bin is binomial: of S cycles left each has a photon with
-    /// probability 1 − e^(−λ/M). So −S·ln(1 − h/S) has the mean λ·S/M, and nearly its variance. Of h = S half a cycle
-    /// is taken as left: a pulse that all cycles count at once is the brightest of all.
+    /// Given what came before, the count h of a bin is binomial: each of the S cycles left has a photon with
+    /// probability 1 − e^(−λ/M). So −S·ln(1 − h/S) has the mean λ·S/M, and nearly its variance. If h = S,
+    /// half a cycle is taken as left: a pulse that all cycles count at once is the brightest of all.
     pub(super) fn of(counts: &[u32], cycles: u32, pile_up: PileUp) -> Self {
         if pile_up == PileUp::None {
             let count = counts.iter().map(|count| f64::from(*count)).collect();

@@ -158,7 +158,7 @@ pub(super) fn lag(after_fs: i128, bin_fs: i64, origin: f64) -> f64 {
     after_fs as f64 / bin_fs as f64 - origin
 }
 
-/// Whether a length of time can be a standard deviation.
+/// True if a length of time can be a standard deviation.
 pub(super) fn is_length(rms_fs: f64) -> bool {
     (1.0..=time::FS_PER_S as f64).contains(&rms_fs)
 }

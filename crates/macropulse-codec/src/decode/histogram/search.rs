@@ -1,4 +1,4 @@
-//! Where in a histogram another pulse would explain most of what is left over.
+//! The search for the place in a histogram where another pulse would explain most of the rest.
 
 use super::model::Model;
 use super::pulse::{self, Kernel, STEPS};
@@ -31,7 +31,7 @@ impl<'a> Search<'a> {
         Self { kernel, gate, bins }
     }
 
-    /// Whether a lag is in the gate.
+    /// True if a lag is in the gate.
     pub fn is_in_gate(&self, lag: f64) -> bool {
         (self.gate.0..=self.gate.1).contains(&lag)
     }

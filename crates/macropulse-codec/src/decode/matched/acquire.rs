@@ -287,10 +287,11 @@ const SOON: i64 = 1000;
 /// Light stands out if twice the root of the most ticks in a stretch exceeds twice the root of the fewest by this. In a
 /// gate of `stretches`, chance does so with a probability of about `false_alarm`.
 ///
-/// Twice the root of a count that chance makes has a variance of about 1 \[Ans48\], be light dense or sparse, and
-/// the difference of two has √2 times that deviation. Of fewer than n² pairs, none exceeds √2·Q⁻¹(α/n²) but with
-/// probability α. Of 200 000 gates of 136 stretches, with α = 0.1 %, 0.09 % have one of 400 ticks on average, 0.13 % of
-/// 40, and 0.9 % of ten, where the root is less even: these are searched for nothing.
+/// Twice the root of a count that chance makes has a variance of about 1 \[Ans48\], in dense and in sparse
+/// light. The difference of two has √2 times that deviation. There are fewer than n² pairs, so the
+/// probability that any exceeds √2·Q⁻¹(α/n²) is below α. With α = 0.1 %, light stands out by chance in 0.09 %
+/// of 200 000 gates of 136 stretches with 400 ticks on average. With 40 ticks it is 0.13 %, and with ten,
+/// where the root is less even, 0.9 %. These gates are searched in vain.
 fn uneven(stretches: f64, false_alarm: f64) -> f64 {
     -std::f64::consts::SQRT_2 * normal_quantile(false_alarm / (stretches * stretches))
 }

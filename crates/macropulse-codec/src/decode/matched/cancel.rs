@@ -1,19 +1,18 @@
 //! Cancellation of complete macropulses: those without a missing mark are taken off the ticks one after another, as
 //! they come.
 //!
-//! 1. In a row: the earliest tick that is not cancelled is taken for the first mark of a macropulse of
-//!    which all marks follow with nothing between them. The shot after the last one found is asked
-//!    first: in smooth scenes it is the one. Otherwise the distance to the next tick tells which word
-//!    it may be.
-//! 2. Woven: where macropulses overlap, the ticks are laid down as bits. Each shot in flight whose
-//!    second mark is there, too, is asked for all of its marks; found, they are put out. The first
-//!    marks may lie under those of one that was cancelled before: of three they are asked for at once, of
-//!    more where several ticks in a row found no macropulse.
+//! 1. In a row: the earliest tick that is not cancelled is taken for the first mark of a macropulse whose
+//!    marks all follow with nothing between them. The shot after the last one found is asked first: in smooth
+//!    scenes it is the one. Otherwise the distance to the next tick tells which word it may be.
+//! 2. Woven: where macropulses overlap, the ticks are laid down as bits. Each shot in flight whose second
+//!    mark is there, too, is asked for all of its marks; found, they are put out. The first marks may lie
+//!    under those of one that was cancelled before. So any of the first three is tried at once as the first
+//!    that is left, and any other if several ticks in a row found no macropulse.
 //!
-//! If no mark is missing no lag can have more, and none earlier is left: this is the maximum. Light
-//! from beyond the gate is cancelled, too, from as far as it may come: it gives no return, but would
-//! pass for noise. A tick of which no macropulse without a gap can begin is left for the receivers
-//! that follow. Where marks are missed everywhere nothing can be cancelled so: this is soon noticed.
+//! If no mark is missing no lag can have more, and none earlier is left: this is the maximum. Light from
+//! beyond the gate is cancelled, too, from as far as it may come: it gives no return, but would pass for
+//! noise. A tick at which no macropulse without a gap can begin is left for the receivers that follow. If
+//! marks are missed everywhere, nothing can be cancelled this way; that is soon noticed.
 //!
 //! Light of guard shots is cancelled only if it may overlap with light of owned ones. Older or younger light tells
 //! nothing of these. Some of it is that of shots that the log does not know, or ends behind the ticks.
@@ -27,10 +26,10 @@ use crate::decode::check::in_order;
 use crate::decode::timeline::Timeline;
 use crate::kernels::{begin_with, lit_after};
 
-/// Ticks without a complete macropulse after which cancellation ends, and how many more for each
-/// macropulse that was found. With four more, four dark counts to a macropulse are borne for ever, and
-/// each asks all shots in flight: a street with 10⁸ of them a second takes 165 times the sensor's time
-/// instead of 46, where the steps that follow do the rest. With 256 and one more it takes as long.
+/// Ticks without a complete macropulse after which cancellation ends, and how many more for each macropulse
+/// that was found. With four more, cancellation bears four dark counts to a macropulse for ever, and each of
+/// these asks all shots in flight. A street with 10⁸ of them a second then takes 165 times the sensor's time,
+/// instead of 46 if the steps that follow do the rest. With 256 and one more it takes as long.
 const PATIENCE: (usize, usize) = (16, 2);
 
 /// Ticks whose order is checked at once where some are laid down: they are in the cache when they are read one after
@@ -72,8 +71,8 @@ impl Cancelled {
     }
 }
 
-/// Cancels the complete macropulses of the shots `sent` in `ticks`; `None` where that was given up. Of the timelines
-/// only the memory is used.
+/// Cancels the complete macropulses of the shots `sent` in `ticks`; `None` if that was given up. Only the
+/// memory of the timelines is used.
 ///
 /// Ticks found in a row ascend. Other ticks are compared with those before them, so that in the end the order of all is
 /// checked.
@@ -229,8 +228,8 @@ impl Canceller<'_> {
         bits.len() * word.ticks().len()
     }
 
-    /// The tick in which the macropulse of `shot` begins if `tick` is its first mark but for those
-    /// `hidden`, comes after one of the `lags`, and could be told from chance.
+    /// Returns the tick in which the macropulse of `shot` begins if `tick` is its first mark behind the
+    /// `hidden` ones. `None` unless it comes after one of the `lags` and can be told from chance.
     #[inline(always)]
     fn start(&self, shot: usize, tick: i64, (hidden, lags): (usize, &Range<i64>)) -> Option<i64> {
         let sent = self.sent;
@@ -337,7 +336,7 @@ impl Canceller<'_> {
         Ok(())
     }
 
-    /// Has the gaps of the `shots` at hand, none of which is before those asked for last.
+    /// Makes the gaps of the `shots` available. No shot may be before those asked for last.
     fn know_gaps(&mut self, shots: &Range<usize>) {
         if shots.start >= self.gaps_of.end {
             self.gaps_of = shots.start..shots.start;
@@ -474,9 +473,10 @@ impl Canceller<'_> {
     }
 }
 
-/// Ticks that are left in the time of a macropulse before any mark of any shot is looked for there. With 4 to 64
-/// a `street` takes as long, clean and with 10⁷ dark counts a second; with 2 this takes a sixth longer, with 1
-/// twice as long; without it a clean one takes a third longer, as some macropulses of each pane begin under others.
+/// Ticks that are left in the time of a macropulse before any mark of any shot is looked for there. With 4 to
+/// 64 a `street` takes equally long, clean and with 10⁷ dark counts a second. With 2 the latter takes a sixth
+/// longer, with 1 twice as long. Without this search a clean one takes a third longer, as some macropulses of
+/// each pane begin under others.
 pub(super) const CLUE: usize = 8;
 
 /// Ticks of overlapping macropulses are laid down for the length of one macropulse, and this part of it more. A whole
@@ -484,6 +484,6 @@ pub(super) const CLUE: usize = 8;
 /// no difference.
 const MORE: i64 = 4;
 
-/// Macropulses that fit into the stretch of time that is laid down where they overlap: it is moved on
-/// as often as light comes, and 16 of the longest word take 32 MB.
+/// Macropulses that fit into the stretch of time that is laid down where they overlap. It is moved on as
+/// often as light comes, and 16 of the longest word take 32 MB.
 const ROOM: i64 = 16;

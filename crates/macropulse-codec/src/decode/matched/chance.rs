@@ -12,9 +12,9 @@ pub(super) const BY_CHANCE: f64 = 1e-3;
 /// A normal variable exceeds it as often as that.
 pub(super) const HARDLY_EVER: f64 = 3.0902;
 
-/// How often chance may light an end of a macropulse where there is none: of the three or four marks of an end of
-/// `street` it then takes two to tell. At 1e-3 it takes three, which one end in five lacks where one mark in
-/// five is missed, and finds the same shots.
+/// Probability with which chance may light an end of a macropulse where there is none. An end of `street` has
+/// three or four marks, and two of them are then enough. At 1e-3 it takes three, which one end in five lacks
+/// if one mark in five is missed. Both find the same shots.
 const AT_AN_END: f64 = 1e-2;
 
 /// The share of blocks in which chance may light as much of a code word as is asked for. There all marks are counted,

@@ -7,9 +7,9 @@ use super::pace::usual;
 use super::track::{WAYS, WIDEST_GAP};
 use super::{Band, Detection, SURFACES};
 
-/// Factor on the shots that are skipped, in light so dense that half of the gate must be counted lag by lag. A search
-/// then takes 290 µs, and otherwise 6 µs. With 10¹⁰ dark counts a second none of 37 268 shots of `car-50m` and of 74
-/// 519 of `street` is lost by this, and decoding takes two thirds of the time.
+/// Factor on the shots that are skipped, in light so dense that half of the gate must be counted lag by lag.
+/// A search then takes 290 µs, and otherwise 6 µs. With 10¹⁰ dark counts a second this loses none of 37 268
+/// shots of `car-50m` and none of 74 519 of `street`. Decoding then takes two thirds of the time.
 const DENSE: f64 = 4.0;
 
 /// Which shots of a block are acquired.
@@ -325,8 +325,8 @@ impl Band<'_> {
         true
     }
 
-    /// Follows a `surface` that stands beside others, as behind a pane of glass, from a shot along the `shots` next
-    /// to it, as long as it is no fainter: to search for each of them alone takes long.
+    /// Follows a `surface` that stands beside others, as behind a pane of glass, from its shot along the
+    /// `shots` next to it, as long as it is no fainter. To search for each of them alone takes long.
     fn follow(&mut self, (shot, surface): (usize, Detection), shots: impl Iterator<Item = usize>) {
         let (mut lag, mut step) = (surface.lag, None);
         let mut share = f64::from(surface.count) / f64::from(self.sent.weight(shot));

@@ -1,8 +1,8 @@
 //! The matched receiver: the lag at which the whole known macropulse of a shot fits best.
 //!
-//! A hypothesis is a shot and a lag, and the rule of [`belief`](super::belief) decides about it. To try every lag with every
-//! mark takes tens of microseconds a shot; so the receiver cancels light that it has explained, as multi-user detectors do,
-//! and looks first where light is likely:
+//! A hypothesis is a shot and a lag, and the rule of [`belief`](super::belief) decides about it. To try every
+//! lag with every mark takes tens of microseconds a shot. So the receiver cancels light that it has
+//! explained, as multi-user detectors do, and looks first where light is likely:
 //!
 //! 1. [`cancel`]: complete macropulses are taken off the stream of ticks one after another: no lag can have
 //!    more marks. In clear light this is all.
@@ -113,10 +113,10 @@ const SURFACES: usize = 3;
 /// Returns of a shot that this receiver can give at most.
 pub(super) const MOST_RETURNS: u8 = 1 + SURFACES as u8;
 
-/// Neighbours that define the expectation for a shot. Those before give the share of its marks, and those to a side the
-/// lag of a doubtful one. In `street` as declared a mean over 32 shots loses 3 of 9099, over 2 none. In a room where
-/// one shot in three is seen, with 3 to a side 0.52 % of 25 898 shots are taken for a sidelobe, as one mistake leads to
-/// the next. With 5 it is 0.30 %, with 8 and with 12 it is 0.21 %.
+/// Neighbours that define the expectation for a shot. Those before give the share of its marks, and those to
+/// a side the lag of a doubtful one. In `street` as declared a mean over 32 shots loses 3 of 9099, over 2
+/// none. In a room where one shot in three is seen, 3 to a side take 0.52 % of 25 898 shots for a sidelobe,
+/// as one mistake leads to the next. With 5 it is 0.30 %, with 8 and with 12 it is 0.21 %.
 const NEIGHBOURS: usize = 8;
 
 thread_local! {
@@ -343,8 +343,8 @@ impl<'a> Band<'a> {
     fn span(sent: &Sent, block: Range<usize>) -> Range<i64> {
         let last = sent.arrival(block.end - 1);
         let first = sent.arrival(block.start);
-        // Shots that are settled with the block are as old as the light of its first one, and their
-        // light is compared with bits a macropulse before it, and one behind it.
+        // Shots that are settled with the block are as old as the light of its first one. Their light is
+        // compared with bits a macropulse before it, and one behind it.
         first.start - (first.end - first.start) - sent.length()..last.end + sent.length()
     }
 

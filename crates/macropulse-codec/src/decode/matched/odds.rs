@@ -1,7 +1,8 @@
 //! Posterior odds: whether a detection is believed, and whether its label fits.
 //!
-//! [`belief`] decides. This module counts what it asks for: the marks of a detection that no fuller return claims, the
-//! marks in each bit, and the light about them that no return explains. Shortcuts come first, where they can tell.
+//! [`belief`] decides. This module counts what it asks for: the marks of a detection that no fuller return
+//! claims, the marks in each bit, and the unexplained light about them. Shortcuts come first, where they can
+//! tell.
 
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -151,8 +152,9 @@ impl Band<'_> {
         (0..later).map(left).max().unwrap_or(0)
     }
 
-    /// The lags that neighbours predict for `shot`: on the lines through them, midway between the nearest two, at those
-    /// of the shots before it, and at that of the next one. If few shots before were found, more behind count.
+    /// Returns the lags that neighbours predict for `shot`. They lie on the lines through neighbours, midway
+    /// between the nearest two, at the lags of the shots before, and at that of the next one. If few shots
+    /// before were found, more behind count.
     pub(super) fn expected_lags(&self, shot: usize) -> Vec<i64> {
         let lag = |shot: usize| Some(self.found.get(shot)?.as_ref()?.lag);
         let before = (0..shot).rev().take(WIDEST_GAP).filter_map(lag);

@@ -3,12 +3,13 @@
 use super::NEIGHBOURS;
 use super::chance::HARDLY_EVER;
 
-/// So many shots are passed by at most, where nothing was found in all of a gate, before the next one is
-/// searched for, and fewer after a part of it. With 256 a whole scan of `kim-park-2016-fixed` in `car-50m`
-/// has 400 of 190 000 points less; it takes half as long in the dark with 10¹⁰ dark counts a second.
+/// Most shots that are passed by, in light of usual density, after a search of a whole gate found nothing.
+/// After a search of a part of the gate it is that share of them. With 256 a whole scan of
+/// `kim-park-2016-fixed` in `car-50m` has 400 of 190 000 points fewer; it takes half as long in the dark with
+/// 10¹⁰ dark counts a second.
 ///
-/// Where no light stands out it is the square of the part, so that what can be in a few places only is searched
-/// for in nearly every shot. By the part itself whole rows of far ground are missed.
+/// If no light stands out it is the square of the share. So light that can be in a few places only is
+/// searched for in nearly every shot. By the share itself whole rows of far ground are missed.
 pub(super) const LONGEST_PAUSE: f64 = 64.0;
 
 /// Pacing: one in a number of shots is searched for, and the number grows as long as none is found.

@@ -3,8 +3,8 @@
 //! The quick receiver looks where light is likely. This one counts all lags, and shows the light that the quick one
 //! skips. It decides by [`belief`](crate::decode::belief) and nothing else:
 //!
-//! 1. What the quick receiver found are the first hypotheses. They save time: light that they explain is not searched
-//!    through.
+//! 1. The detections of the quick receiver are the first hypotheses. They save time: light that they explain
+//!    is not searched through.
 //! 2. All hypotheses are judged, the fullest first. Each sees the ticks and the places that fuller returns leave
 //!    ([`residual`]), and a prior made from fuller returns of the shots beside it.
 //! 3. A hypothesis stands for its sidelobes, too: it is judged at the best lag of those whose light overlaps with its
@@ -19,10 +19,10 @@
 //! As soon as the returns about a shot are known, its lag is the best one by the prior of all of them, if it has a single
 //! return.
 //!
-//! The shots of a band are decoded in blocks. A block has the shots of some gates and all that were in flight before.
-//! A shot is searched and settled when no later light overlaps with its own. What is settled stays, and claims light of
-//! the next block first. The end of a block can change a verdict only where light of a shot behind it overlaps with that
-//! of a settled shot, and the quick receiver has not found it.
+//! The shots of a band are decoded in blocks. A block has the shots of some gates and all that were in flight
+//! before. A shot is searched and settled when no later light overlaps with its own. Settled returns stay,
+//! and claim light of the next block first. The end of a block can change a verdict only if light of a shot
+//! behind it overlaps that of a settled shot, and the quick receiver missed it.
 
 pub(super) mod residual;
 pub(super) mod search;
@@ -214,10 +214,10 @@ impl<'a> Reference<'a> {
 
     /// How the label of `shot` at `lag` is judged.
     ///
-    /// A second surface may light bits that the first one leaves dark, and the other way round. So neither can be told
-    /// from light of another label before both are known: the label is contradicted if it is without the light of
-    /// further ones that the shot proposed, too. Light whole bits away does not count, as it lights the bits that
-    /// another label would.
+    /// A second surface may light bits that the first one leaves dark, and the other way round. So neither
+    /// can be told from light of another label before both are known. The label is contradicted if it still
+    /// does not fit without the light of further surfaces that the shot proposed. Light whole bits away does
+    /// not count, as it lights the bits that another label would.
     fn label(&mut self, shot: usize, lag: i64, prior: &Prior) -> Label {
         if self.sent.bits_of_payload() == 1 || self.against(shot, lag, prior) <= 0.0 {
             return Label::Fits;

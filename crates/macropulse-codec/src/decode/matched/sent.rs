@@ -30,8 +30,8 @@ pub(super) struct Sent<'a> {
     bits: i64,
     bit_length: i64,
     length: i64,
-    /// Ticks from as many bits before the start of a macropulse as a payload has, to each bit until as many
-    /// behind its end.
+    /// Ticks to each bit about a macropulse, from one length before its start to one length behind its end.
+    /// They count from the first of these bits.
     bits_about: Vec<u32>,
     /// Length of the stretch in which a mark may be found, in ticks.
     pub width: u32,
@@ -78,7 +78,8 @@ struct Word {
 }
 
 impl Word {
-    /// A word with marks in these `chips`, `scale` ticks a chip, any of which lights `places` of them.
+    /// The code word `word`, with `scale` ticks a chip. A tick may count for marks in `places` chips in a
+    /// row.
     fn new(word: &CodeWord, scale: u32, places: u32) -> Self {
         let marks = &word.marks;
         let first = std::array::from_fn(|mark| {
@@ -92,7 +93,7 @@ impl Word {
     }
 }
 
-/// Which of the bits of [`Words`] are those of a label: the lit ones, and behind them the dark ones.
+/// The bits of a label among those of [`Words`]: the lit ones, and behind them the dark ones.
 struct Label {
     lit: u32,
     dark: u32,
@@ -295,9 +296,9 @@ impl<'a> Sent<'a> {
         &self.words.bits[dark as usize..end as usize]
     }
 
-    /// The `sums` of `found` over the lit bits of `shot`, where that has a number for each of the
-    /// [`Self::bits_about`] it: if it begins as many bits earlier as a payload has, one fewer, and so on, until as
-    /// many later.
+    /// Sums `found` over the lit bits of `shot` into `sums`, for each shift of its macropulse by whole bits.
+    /// The shifts go from one payload earlier to one payload later. `found` has a number for each of the
+    /// [`Self::bits_about`] it.
     pub fn in_bits(&self, shot: usize, found: &[u32], sums: &mut Vec<u32>) {
         sums.clear();
         sums.resize(2 * self.bits as usize + 1, 0);
@@ -329,8 +330,8 @@ impl<'a> Sent<'a> {
         self.bits
     }
 
-    /// Ticks from as many bits before the start of a macropulse as a payload has, to each bit until as many
-    /// behind its end.
+    /// Returns the ticks to each bit about a macropulse, from one length before its start to one length
+    /// behind its end. They count from the first of these bits.
     pub fn bits_about(&self) -> &[u32] {
         &self.bits_about
     }
@@ -341,9 +342,9 @@ impl<'a> Sent<'a> {
         i64::from(nearest)..i64::from(farthest) + 1
     }
 
-    /// The lags at which light is looked for: those of the gate, and all beyond it from which light
-    /// may come, a macropulse farther at least. What stands there has sidelobes within the gate, and
-    /// lights marks of later shots; known, it is told from returns.
+    /// Returns the lags at which light is looked for: those of the gate, and all beyond it from which light
+    /// may come, a macropulse farther at least. Light from beyond has sidelobes within the gate, and lights
+    /// marks of later shots. Once known, it is told from returns.
     pub fn reach(&self) -> Range<i64> {
         self.reach.clone()
     }
@@ -436,10 +437,11 @@ impl<'a> Sent<'a> {
         }
     }
 
-    /// Greatest number of ticks that light of `shot` makes if `marks` of it are lit, k of N.
+    /// Returns the greatest number of ticks that light of `shot` makes if `marks` of it are lit, k of N.
     ///
-    /// A mark makes one tick. But where each photon makes an event of its own, and marks have n photons on average, a mark
-    /// stays dark with the probability e⁻ⁿ: k lit ones tell of N·n = N·ln(1/(1 − k/N)) photons. Three deviations are added.
+    /// A mark makes one tick. But if each photon makes an event of its own, and marks have n photons on
+    /// average, a mark stays dark with the probability e⁻ⁿ. Then k lit marks stand for
+    /// N·n = N·ln(1/(1 − k/N)) photons. Three deviations are added.
     pub fn ticks_at_most(&self, shot: usize, marks: u32) -> u32 {
         if !self.correlation.photons_apart || marks == 0 {
             return marks;

@@ -24,7 +24,7 @@ pub(super) struct Sensor {
     pub(super) gate: u32,
 }
 
-/// What light meets on its way: everything in one place, or each shot somewhere else.
+/// Conditions on the way of light. The surfaces are all in one place, or each shot meets one somewhere else.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Weather {
     /// Marks missed, of 100.
@@ -69,7 +69,7 @@ pub(super) fn books() -> Vec<Codebook> {
 }
 
 impl Sensor {
-    /// One of which about five shots are in flight, and where their macropulses overlap.
+    /// Returns a sensor with about five shots in flight, whose macropulses overlap.
     pub(super) fn crowded(book: Codebook) -> Self {
         Self { book, period: 1100, gate: 5000 }
     }
@@ -88,7 +88,7 @@ impl Sensor {
         Correlation { light_ticks, jitter_ticks, false_alarm, ..Correlation::default() }
     }
 
-    /// What is sent, as the matched `receiver` knows it.
+    /// Returns the light sent, as the matched `receiver` knows it.
     pub(super) fn sent<'a>(&'a self, receiver: &'a Receiver, log: &'a ShotLog) -> Sent<'a> {
         let Method::Matched(correlation, _) = &receiver.method else { panic!() };
         let words = Words::default();
@@ -110,8 +110,8 @@ impl Sensor {
         }
     }
 
-    /// The lags of the surfaces that each of so many shots meets, along a rough wall; one shot in eight
-    /// meets nothing.
+    /// Returns the lags of the surfaces that each of this number of `shots` meets, along a rough wall. One
+    /// shot in eight meets nothing.
     pub(super) fn wall(
         &self,
         shots: usize,
@@ -258,8 +258,8 @@ fn exhaustive(sent: &Sent, ticks: &[u32], shot: usize, lags: std::ops::Range<i64
     (best, count(best))
 }
 
-/// Most marks of `shot` that can have a tick each if its light comes after `lag`: marks are given ticks one
-/// by one, and others make room where they can have another one.
+/// Returns the most marks of `shot` that can have a tick each if its light comes after `lag`. Marks are given
+/// ticks one by one, and others make room if they can have another one.
 fn marks_with_ticks(sent: &Sent, ticks: &[u32], shot: usize, lag: i64) -> u32 {
     fn finds(
         mark: usize,
@@ -318,8 +318,8 @@ proptest! {
             let found = band.maximum(shot, &[lags], least);
             prop_assert_eq!(found, (count >= least).then_some((lag, count)));
         }
-        // What is cancelled is gone: from as far before a mark as behind the stretch in which it is
-        // looked for.
+        // The ticks of a cancelled mark are gone. They reach as far before the mark as behind the stretch in
+        // which it is looked for.
         let lag = surfaces[5].first().map_or(2000, |&lag| i64::from(lag));
         band.cancel(5, lag);
         let farther = i64::from(sent.width / 2);
@@ -332,7 +332,7 @@ proptest! {
         let left: Vec<u32> = ticks.tick.iter().copied().filter(is_left).collect();
         for shot in 4..8 {
             let (lag, count) = exhaustive(&sent, &left, shot, 0..sensor.gate.into());
-            // Of parts as of the whole.
+            // The maximum of the parts is that of the whole.
             let [middle, gate] = [2600, i64::from(sensor.gate)];
             let cut = if least % 2 == 0 { middle } else { gate - 1 };
             let found = band.maximum(shot, &[0..cut, cut..gate], least);
@@ -365,8 +365,7 @@ proptest! {
             let count = counter(&sent, &ticks.tick, shot);
             let highest = sent.reach().map(&count).max().unwrap();
             let lag = returns.tof[place] / 2.5e-12 - 0.5;
-            // Where ticks may count for two marks, that of these lags where they are most if each counts
-            // for one.
+            // Ticks may count for two marks. The lag sought has the most marks if each tick counts for one.
             let twice = sent.bits(shot).shared * sent.lit_bits(shot).len() as u32;
             let among = sent.reach().filter(|lag| count(*lag) + twice >= highest);
             let most = among.map(|lag| marks_with_ticks(&sent, &ticks.tick, shot, lag)).max();
@@ -485,10 +484,10 @@ fn shots_far_apart_are_found() {
     }
 }
 
-/// Word 0 is a comb of eleven teeth: where the last mark of every run of lit bits is missed, as many
-/// marks are found a tooth earlier. N = 3508 shots that met the wall, seeds 1 to 4; R runs lose all
-/// their last marks with the probability 0.3ᴿ. On a smooth wall fewer than one in 300 is a tooth off;
-/// negative control: on a rough one, of which neighbours tell nothing, more than one in 50.
+/// Word 0 is a comb of eleven teeth. If the last mark of every run of lit bits is missed, the same number of
+/// marks is found a tooth earlier. N = 3508 shots that met the wall, seeds 1 to 4; R runs lose all their last
+/// marks with the probability 0.3ᴿ. On a smooth wall fewer than one in 300 is a tooth off. Negative control:
+/// on a rough one, where neighbours tell nothing, more than one in 50.
 #[test]
 fn neighbours_tell_which_of_equal_lags_it_is() {
     let sensor = Sensor { period: 6000, ..Sensor::crowded(codebook()) };

@@ -15,24 +15,25 @@ const SIDES: i64 = (COARSE as i64 - 1) / 2;
 /// The lags to both sides of a peak that are always seen with it.
 pub(super) const NEAREST_SIDE: i64 = BLOCK / 2 - OFF;
 
-/// A peak farther than this from the middle of its block is looked at again in the middle of one. At an eighth of
-/// that one shot in three of `street` is counted twice; at twice that fewer lags are seen to both sides, so that
-/// fewer marks at the ends of a macropulse tell that it is no sidelobe: a noisy scan takes a seventh longer.
+/// A peak farther than this from the middle of its block is looked at again in the middle of one. At an
+/// eighth of that one shot in three of `street` is counted twice. At twice that fewer lags are seen to both
+/// sides, so that fewer marks at the ends of a macropulse tell that it is no sidelobe. A noisy scan then
+/// takes a seventh longer.
 const OFF: i64 = BLOCK / 8;
 
-/// In faint light a shot is looked for near one that was found at most this number of shots away. It is the longest
-/// pause between two searches, so that none between is out of reach. In a room where one shot in ten can be found, 12
-/// find 7 % of 1884 shots, 24 find 15 %, and this value half. Where half can be found, 12 lose 336 of 9670 shots, both
-/// others 100.
+/// In faint light a shot is looked for near one that was found at most this number of shots away. It is the
+/// longest pause between two searches, so that none between is out of reach. In a room where one shot in ten
+/// can be found, 12 find 7 % of 1884 shots, 24 find 15 %, and this value half. If half can be found, 12 lose
+/// 336 of 9670 shots, both others 100.
 pub(super) const WIDEST_GAP: usize = LONGEST_PAUSE as usize;
 
 /// Ways in which the lag of a shot is to be expected.
 pub(super) const WAYS: usize = 5;
 
 impl Band<'_> {
-    /// The lag at which `shot` is to be expected after its neighbours, in one of [`WAYS`]: on the line
-    /// through two of them and the plane through three, and at the lag of one, which may be `gap`
-    /// shots away.
+    /// Returns the lag at which `shot` is to be expected after its neighbours, in one of [`WAYS`]. These are
+    /// the line through two of them, the plane through three, and the lag of one, which may be `gap` shots
+    /// away.
     pub(super) fn expected(&self, shot: usize, gap: usize, way: usize) -> Option<i64> {
         let at = |shot: Option<usize>| Some(self.found.get(shot?)?.as_ref()?.lag);
         let beside = |of: &[Option<u32>], shot: Option<usize>| {
@@ -142,8 +143,8 @@ impl Band<'_> {
         peaks.max_by_key(of).filter(|peak| of(peak) > of(&detection))
     }
 
-    /// Of each eight lags from about `lag` on, whether `least` marks of `shot` may be found at any of them; and
-    /// which is the first.
+    /// Returns bits for groups of eight lags, lit if `least` marks of `shot` may be found at any of the
+    /// eight; and the first lag, which is about `lag`.
     ///
     /// One bit of the picture covers the sixteen ticks on which a mark may fall at any of the lags. So it shows at
     /// least the marks that are found at any of them.
@@ -162,8 +163,8 @@ impl Band<'_> {
         (enough, origin + COARSE as i64 * bit - fired)
     }
 
-    /// The best peak at which more marks of `shot` are found than at `detection`, some of its bits
-    /// earlier or later: there, a part of the lit bits falls upon lit bits.
+    /// Returns the best peak at which more marks of `shot` are found than at `detection`, some of its bits
+    /// earlier or later. There, a part of the lit bits falls upon lit bits.
     fn whole_bits_away(&mut self, shot: usize, detection: Detection) -> Option<Detection> {
         let sent = self.sent;
         let (bits, length) = (sent.bits_of_payload(), sent.bit_length());
@@ -182,8 +183,8 @@ impl Band<'_> {
         self.best_in_block(shot, highest?.1)
     }
 
-    /// The marks of the word of `shot` that are `found` at the place of each bit, from the length of a payload before
-    /// tick `start` to twice that length behind it.
+    /// Counts the marks of the word of `shot` at the place of each bit about tick `start`, into `found`. The
+    /// places go from the length of a payload before it to twice that length behind it.
     fn words_about(&self, shot: usize, start: i64, found: &mut Vec<u32>) {
         let (bits, length) = (self.sent.bits_of_payload(), self.sent.bit_length());
         let (after, pattern) = (self.sent.bits_about(), &self.sent.bits(shot).pattern);

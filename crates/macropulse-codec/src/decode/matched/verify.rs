@@ -86,10 +86,11 @@ impl Band<'_> {
     /// Moves `shot` to the likeliest lag: among those with the same number of marks, or one fewer, the one with the
     /// highest posterior odds.
     ///
-    /// Several lags may have as many marks. The marks of a word may be a comb, as those of the first prime sequence are.
-    /// Shifted by a tooth, a comb falls upon itself but for the last marks in every run of lit bits. If the detector missed
-    /// these, both lags have as many marks, and only the neighbours of the shot tell them apart. A tick that may be one of
-    /// two marks would favour the wrong lag, so it counts for one.
+    /// Several lags may have the same number of marks. The marks of a word may be a comb, as those of the
+    /// first prime sequence are. Shifted by a tooth, a comb falls upon itself but for the last marks in every
+    /// run of lit bits. If the detector missed these, both lags have the same number of marks, and only the
+    /// neighbours of the shot tell them apart. A tick that may be one of two marks would favour the wrong
+    /// lag, so it counts for one.
     fn choose_of_equals(&mut self, shot: usize) {
         let weight = self.sent.weight(shot);
         let Some(found) = self.found[shot].filter(|found| found.count < weight) else { return };
@@ -182,8 +183,8 @@ impl Band<'_> {
             && !self.is_open(shot)
     }
 
-    /// Whether the marks found are spread over the code word. Light of another word meets the same one
-    /// or two of its marks in every bit, and makes many marks of few.
+    /// True if the marks found are spread over the code word. Light of another word meets the same one or two
+    /// of its marks in every bit, and makes many marks of few.
     ///
     /// If a share q is found in each of B bits, a mark of the word is found in none of them with probability (1 − q)ᴮ.
     /// The marks are not spread if chance leaves out this number of the W marks with a probability of `BY_CHANCE` or

@@ -74,10 +74,10 @@ pub struct PhaseReceiver {
 
 /// The returns of the owned shots of `log`, one of each at most, `taps` being those of all its shots.
 ///
-/// `peak` of a return counts the modulation frequencies that were used and `marks` all of them; `photons` are the
-/// electrons of modulated light of the whole shot. `margin` is in standard deviations: how far the amplitude is above
-/// the noise or, if that is less, how much worse the next best number of whole periods explains the phases.
-/// `saturated` says that a tap was full.
+/// `peak` of a return counts the modulation frequencies that were used and `marks` all of them; `photons` are
+/// the electrons of modulated light of the whole shot. `margin` is in standard deviations. It tells how far
+/// the amplitude is above the noise or, if that is less, how much worse the next best number of whole periods
+/// explains the phases. `saturated` says that a tap was full.
 ///
 /// # Errors
 /// If a setting is outside its limits, columns differ in length, or the log is out of order. A shot in which nothing

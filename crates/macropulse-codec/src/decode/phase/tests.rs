@@ -109,8 +109,8 @@ fn four_taps_have_the_precision_of_the_closed_form() {
     approx::assert_relative_eq!(light, 4e4, max_relative = 1e-3);
 }
 
-/// Frequencies f with the greatest common divisor g tell ranges apart to c/2g: published are 4.997 m for 120 and
-/// 90 MHz, 8.328 m for 90 and 72 MHz, and 18.737 m for 80, 16 and 120 MHz.
+/// Frequencies f with the greatest common divisor g tell ranges apart to c/2g. Published are 4.997 m for 120
+/// and 90 MHz, 8.328 m for 90 and 72 MHz, and 18.737 m for 80, 16 and 120 MHz.
 #[test]
 fn several_frequencies_tell_ranges_apart_to_their_common_interval() {
     for (mhz, interval) in
@@ -140,9 +140,9 @@ fn several_frequencies_tell_ranges_apart_to_their_common_interval() {
     }
 }
 
-/// H0: the range is off by whole intervals c/2f of the finer frequency f with the probability 2·Q(c/(4fσ)), σ the
-/// standard deviation of the difference of the two ranges, where no third interval is near. N = 40 000, seed 8,
-/// α = 1e-6 (|z| < 4.9). Control: twice that probability.
+/// H0: the range is off by whole intervals c/2f of the finer frequency f with the probability 2·Q(c/(4fσ)),
+/// if no third interval is near. Here σ is the standard deviation of the difference of the two ranges.
+/// N = 40 000, seed 8, α = 1e-6 (|z| < 4.9). Control: twice that probability.
 #[test]
 fn a_wrong_interval_is_as_likely_as_the_noise_of_the_coarse_phase_says() {
     let tones = vec![Tone::pure(1e7, 4, 0.4), Tone::pure(1e8, 4, 0.4)];

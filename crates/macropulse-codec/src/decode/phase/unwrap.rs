@@ -38,9 +38,9 @@ pub(super) fn unwrapped(phasors: &[Phasor], gate_fs: (i64, i64)) -> Option<Unwra
     best.map(|best| Unwrapped { tof: best.tof, apart: (next - best.cost).max(0.0).sqrt() })
 }
 
-/// How much worse light of the time of flight `tof`, s, is explained by each other number of whole periods in the gate,
-/// in standard deviations of its phases: what a forecast of wrong intervals needs. Light of each tone has a phase of this
-/// variance, rad².
+/// Returns how much worse each other number of whole periods in the gate explains light of the time of flight
+/// `tof`, s. The values are in standard deviations of its phases; a forecast of wrong intervals needs them.
+/// Each of the `tones` has a frequency, Hz, and the variance of the phase of its light, rad².
 pub fn rivals(tones: &[(f64, f64)], tof: f64, gate_fs: (i64, i64)) -> Vec<f64> {
     let tone = |(hz, _): &(f64, f64)| Tone::pure(*hz, 3, 1.0);
     let all: Vec<Tone> = tones.iter().map(tone).collect();

@@ -22,10 +22,10 @@ const EQUAL: f32 = 3.0;
 const SPREAD: f32 = 0.08;
 
 /// Factor by which marks without other light may differ. The spot moves on during a word; across an edge, one
-/// mark has more of it on the surface than another. For `coded-32`, whose spot moves by 0.3 pixels, eleven of
-/// 302 pixels of `car-70m`, all at its outline, had a mark hidden and the others apart by factors of 1.3 to
-/// 1.9. With this factor none is lost, and `coded-16` has no more false points on tiles without neighbours:
-/// 33 of 196 012 as before.
+/// mark has more of it on the surface than another. The spot of `coded-32` moves by 0.3 pixels. Eleven of 302
+/// pixels of `car-70m`, all at its outline, had a mark hidden and the others apart by factors of 1.3 to 1.9.
+/// With this factor none is lost, and `coded-16` has no more false points on tiles without neighbours: 33 of
+/// 196 012 as before.
 const SPLIT: f32 = 2.0;
 
 /// Light that was found.

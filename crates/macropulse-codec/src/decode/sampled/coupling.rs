@@ -1,10 +1,10 @@
-//! What an amplifier that is coupled by a capacitor does to its baseline, and how the receiver undoes it.
+//! The baseline of an amplifier that is coupled by a capacitor, and how the receiver restores it.
 //!
 //! The baseline b follows the signal x from tick to tick by bₙ₊₁ = bₙ + f·(xₙ − bₙ), f = 1 − exp(−ω·T), and
-//! the samples are y = x − b. The receiver knows ω: it takes what the samples and its own baseline add up to
-//! for the signal, and lets that baseline follow it wherever there is light, which noise does not reach, and
-//! where the amplifier is at its limit, at which the samples are clipped. Noise is left out: its baseline is
-//! small, and adding it up again would have no end.
+//! the samples are y = x − b. The receiver knows ω. It takes the sum of the samples and its own baseline for
+//! the signal. That baseline follows the signal wherever there is light, which noise does not reach. If
+//! samples are clipped, the amplifier is at its limit, and the baseline follows that. Noise is left out: its
+//! baseline is small, and adding it up again would have no end.
 
 use super::Sampling;
 use super::filter::usual;
@@ -14,15 +14,15 @@ use super::filter::usual;
 pub struct Coupling {
     /// Angular frequency below which nothing passes, per tick.
     pub low_cutoff: f64,
-    /// What the amplifier puts out while it is at its limit, in codes: the highest one, or more.
+    /// Output of the amplifier at its limit, in codes: the highest code, or more.
     pub limit: f64,
 }
 
-/// From so many standard deviations on a sample is light.
+/// Standard deviations from which on a sample is light.
 const LIGHT: f64 = 4.0;
 
-/// What the baseline is at the beginning is told by so many samples: most of them are dark, and of as many
-/// as these the median is right to a fiftieth of the noise.
+/// Samples that tell the baseline at the beginning. Most of them are dark, and the median of this number is
+/// right to a fiftieth of the noise.
 const FIRST: usize = 4096;
 
 /// Samples with their baseline at 0.
@@ -30,12 +30,12 @@ const FIRST: usize = 4096;
 pub(super) struct Restored {
     /// Whole codes; those that were clipped have the highest one, and no others.
     pub codes: Vec<i16>,
-    /// What each is more than that.
+    /// The excess of each sample over its whole code.
     pub rest: Vec<f32>,
 }
 
 impl Restored {
-    /// Of `codes` as they came; `None` where nothing was taken from them.
+    /// Restores `codes` as they came; `None` if no coupling took anything from them.
     pub(super) fn of(codes: &[i16], sampling: &Sampling) -> Option<Self> {
         let coupling = sampling.coupling?;
         let (highest, full_scale) = (f64::from(sampling.full_scale), sampling.full_scale);
@@ -65,8 +65,8 @@ impl Restored {
         Some(restored)
     }
 
-    /// What is decoded, of `codes` as they came: those with their baseline at 0, and what each is more than
-    /// that, nothing where nothing was `restored`.
+    /// Returns the samples to decode: whole codes with their baseline at 0, and the excess of each over its
+    /// code. If nothing was `restored`, these are the `codes` as they came, without an excess.
     pub(super) fn parts<'a>(
         restored: &'a Option<Self>,
         codes: &'a [i16],
@@ -92,8 +92,8 @@ mod tests {
         }
     }
 
-    /// Pulses of five ticks every 300, clipped and faint ones in turn, behind a coupling that forgets by e in
-    /// 200 ticks, with the codes that a converter makes of them.
+    /// Pulses of five ticks every 300, clipped and faint ones in turn, and the codes that a converter makes
+    /// of them. They are behind a coupling that forgets by e in 200 ticks.
     fn coupled(coupling: &Coupling) -> (Vec<f64>, Vec<i16>) {
         let follows = -libm::expm1(-coupling.low_cutoff);
         let light = |at: usize| match (at % 300, at / 300 % 2) {
@@ -112,8 +112,8 @@ mod tests {
         (signal, codes)
     }
 
-    /// What was there is there again, to a code, when what was taken for the beginning is forgotten. Control:
-    /// without it the samples are up to twenty codes below.
+    /// The signal is restored to a code, once the estimate of the first baseline is forgotten. Control: some
+    /// samples are more than twenty codes below.
     #[test]
     fn what_the_coupling_takes_is_added_again() {
         let coupling = Coupling { low_cutoff: 1.0 / 200.0, limit: 1100.0 };

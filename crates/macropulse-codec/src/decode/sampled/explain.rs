@@ -43,8 +43,8 @@ pub struct SampledExplanation {
     /// The same when its first candidate was tested, or of none at the end: without the light that was found
     /// by then.
     pub left: Vec<f32>,
-    /// The signal behind the matched filter about the marks at the first lag of `tested`: the tick that it
-    /// begins with, the signal at first, and what of it was left when that lag was tested.
+    /// The signal behind the matched filter about the marks at the first lag of `tested`. First comes the
+    /// tick that it begins with, then the signal at first, and then the signal left when that lag was tested.
     pub signal: (i64, Vec<f32>, Vec<f32>),
     /// Lags in the order of their tests: first those whose light is there for certain. If there is none, the
     /// lag with the highest score, as it would have been tested at the end.
@@ -163,8 +163,8 @@ impl Receiver {
         let channels = owned.each_channel();
         let of_channel = channels.iter().find(|(shots, _)| shots.contains(&shot));
         let Some((shots, log)) = of_channel else { return Err(Error::NoSuchShot { shot }) };
-        // Without samples only the shot matters, and its own tick is the epoch: that of the samples, and the
-        // times of other shots, may be too far away to be counted.
+        // Without samples only the shot matters, and its own tick is the epoch. The epoch of the samples and
+        // the times of other shots may be too far away to be counted.
         let alone;
         let (log, epoch, decoded) = if samples.is_empty() {
             alone = log.part(log.owned.clone());

@@ -9,7 +9,7 @@ use crate::kernels::filter;
 /// Filtered samples that the noise is estimated from, at most.
 const PICKED: usize = 1 << 17;
 
-/// From so many standard deviations above the level on, what stands there is light.
+/// Standard deviations above the level from which on the signal is light.
 pub(super) const LIGHT: f32 = 4.0;
 
 /// The samples of a channel, filtered: the signal in detected photons per mark.
@@ -40,7 +40,7 @@ impl Filtered {
             let within = |at: i64| at.clamp(0, codes.len() as i64) as usize;
             within(range.start - more)..within(range.end + more)
         };
-        // What stray light clips is over when the channel is blind no more.
+        // Clipping by stray light is over when the channel is blind no more.
         let is_stray = |clipped: &Range<i64>| {
             let after = leaves.partition_point(|blind| blind.start < clipped.end);
             after > 0 && leaves[after - 1].end >= clipped.end
@@ -62,7 +62,7 @@ impl Filtered {
         Self { signal, doubt, dark, sigma: sigma.max(rounding.sqrt()) }
     }
 
-    /// Whether the sample at this place was taken for a dark one.
+    /// True if the sample at this place was taken for a dark one.
     pub(super) fn is_dark(&self, place: usize) -> bool {
         let after = self.dark.partition_point(|dark| dark.start <= place);
         after > 0 && place < self.dark[after - 1].end
@@ -89,7 +89,7 @@ pub(super) fn own_marks(
         let middle = mark - core;
         let earliest = middle - pulse.reach as i64;
         match (earliest..middle).rev().take_while(|at| is_lit(*at)).last() {
-            // What is left before the first sample that stands out is less than noise in the next one.
+            // The light left before the sample ahead of the first that stands out is less than noise.
             Some(first) => first - 1,
             None => middle,
         }
@@ -139,13 +139,13 @@ fn runs(codes: &[i16], full_scale: i16) -> impl Iterator<Item = Range<i64>> {
     })
 }
 
-/// Level and standard deviation of the noise of a filtered `signal`: its median, and how far the
-/// 15.87 % quantile is below it. Echoes can only add, and so would draw the median up, by 1.25 σ times the
-/// share of time that they take, and the deviation by half of that: what stands out at a first look is
-/// left out of a second one, together with the ticks `beside` it.
+/// Returns the level and the standard deviation of the noise of a filtered `signal`: its median, and how far
+/// the 15.87 % quantile is below it. Echoes can only add. They would draw the median up by 1.25 σ times the
+/// share of time that they take, and the deviation by half of that. So light that stands out at a first look
+/// is left out of a second one, together with the ticks `beside` it.
 ///
-/// From N independent values the level is right to 1.25 σ/√N, and the deviation to 1.49 σ/√N: to 0.35 and
-/// 0.41 % of σ from as many as are picked. At a threshold of 5 σ false returns then are rarer or more
+/// From N independent values the level is right to 1.25 σ/√N, and the deviation to 1.49 σ/√N. With the number
+/// that is picked, these are 0.35 and 0.41 % of σ. At a threshold of 5 σ false returns then are rarer or more
 /// frequent than accepted by 11 %.
 fn noise(signal: &[f32], doubt: &[f32], beside: usize) -> (f32, f32) {
     let step = signal.len().div_ceil(PICKED).max(1);
@@ -160,7 +160,7 @@ fn noise(signal: &[f32], doubt: &[f32], beside: usize) -> (f32, f32) {
         about.iter().all(|value| *value <= level + LIGHT * sigma)
     };
     let dark: Vec<usize> = places.iter().copied().filter(is_dark).collect();
-    // Where there is hardly a dark tick, the first look has to do.
+    // If there is hardly a dark tick, the first look has to do.
     if dark.len() * 4 < places.len() { (level, sigma) } else { estimate(&dark) }
 }
 
@@ -190,7 +190,7 @@ mod tests {
     use rand_chacha::rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Noise of level 3 and deviation 36; so many of 100 stretches of ten ticks have light on them.
+    /// Returns noise of level 3 and deviation 36; `lit` of 100 stretches of ten ticks have light on them.
     fn noisy(lit: usize) -> Vec<f32> {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut noise = || -> f32 { StandardNormal.sample(&mut rng) };
@@ -198,8 +198,8 @@ mod tests {
         (0..200_000).map(|at| 3.0 + 36.0 * noise() + light(at)).collect()
     }
 
-    /// From N = 100 000 ticks, every other: 1.25/√N and 1.49/√N of σ, four times each. Where a tenth is
-    /// lit, what is beside the light is left out, too.
+    /// From N = 100 000 ticks, every other: 1.25/√N and 1.49/√N of σ, four times each. If a tenth is lit, the
+    /// ticks beside the light are left out, too.
     #[test]
     fn light_does_not_raise_the_noise() {
         for lit in [0, 2, 10] {

@@ -61,8 +61,8 @@ pub struct Sampled {
 /// A receiver's knowledge of the signal that is sampled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sampling {
-    /// Shape of a mark of one detected photon in the codes, in steps of 1/[`STEPS_OF_TICK`] tick; the entry
-    /// in the middle, of an odd number, is at the time of the mark.
+    /// Shape of a mark of one detected photon in the codes, in steps of 1/[`STEPS_OF_TICK`] tick. The number
+    /// of entries is odd, and the middle one is at the time of the mark.
     pub pulse: Vec<f32>,
     /// Excess noise factor F of the multiplication: n photons vary by F·n.
     pub excess: f64,
@@ -105,8 +105,8 @@ impl Sampling {
     /// estimate of the noise.
     pub const STANDS_OUT: f64 = filter::LIGHT as f64;
 
-    /// By how many of its own standard deviations the least of the marks that count lies below one that has light
-    /// of others on it, and counts for nothing where enough are left.
+    /// A mark has light of others if it is this number of standard deviations above the least mark that
+    /// counts, in deviations of that one. Such a mark counts for nothing if enough others are left.
     pub const FAR_ABOVE_LEAST: f64 = FAR as f64;
 
     /// The most that one mark counts, in its own standard deviations above the least of the `counted` marks,
@@ -318,10 +318,10 @@ impl Rule {
     /// The threshold t is that of noise alone: Q(t) = false returns accepted per shot over the lags of the
     /// gate.
     ///
-    /// Sums at neighbouring lags have noise in common, but above a high threshold they hardly exceed it
-    /// together without one being the peak: their number bounds that of independent ones closely. That
-    /// marks are capped makes false returns rarer: of words of three marks 0.5 to 0.8 of what is accepted
-    /// were found in noise alone, and half of that where a sixth of the marks was blanked.
+    /// Sums at neighbouring lags have noise in common. But above a high threshold they hardly exceed it
+    /// together without one being the peak, so their number bounds that of independent ones closely. Capped
+    /// marks make false returns rarer. In noise alone, words of three marks gave 0.5 to 0.8 of the false
+    /// returns accepted, and half of that if a sixth of the marks was blanked.
     fn new(band: &Band, sigma: f32) -> Self {
         let Sampled { false_alarm, sampling, .. } = band.settings;
         let (nearest, farthest) = band.receiver.gate_ticks;

@@ -3,8 +3,8 @@
 
 use super::{STEPS_OF_TICK, Sampling};
 
-/// What is less than this share of the highest is left out of the filter: all of it is 10⁻⁴ of the
-/// energy of a pulse as smooth as Gauss's.
+/// Samples below this share of the highest are left out of the filter. Together they have 10⁻⁴ of the energy
+/// of a pulse as smooth as Gauss's.
 const LEFT_OUT: f32 = 0.01;
 
 /// Times at which the answer of the filter is looked at, in ticks to both sides of its highest.
@@ -20,14 +20,13 @@ pub(super) struct Pulse {
     pub taps: Vec<f32>,
     /// Half the length of the filter, in ticks.
     pub reach: usize,
-    /// What the filter makes of the pulse, in steps of 1/[`STEPS_OF_TICK`] tick; the middle is at the time
-    /// of the mark.
+    /// The filtered pulse, in steps of 1/[`STEPS_OF_TICK`] tick; the middle is at the time of the mark.
     answer: Vec<f32>,
     /// How late the filtered pulse is if the vertex of the parabola through three samples of it is, ticks;
     /// ascending.
     vertices: Vec<(f64, f64)>,
-    /// Ticks before its time at which the pulse is at a share of its highest, and behind it, by −ln of the
-    /// share, ascending: by that, edges of pulses are nearly straight.
+    /// Ticks before its time, and behind it, at which the pulse is at a share of its highest. They ascend by
+    /// −ln of the share, by which edges of pulses are nearly straight.
     edges: [Vec<(f64, f64)>; 2],
 }
 
@@ -75,12 +74,12 @@ impl Pulse {
         (0..self.reach).find(|apart| missing(*apart) < 0.1 * all).unwrap_or(self.reach)
     }
 
-    /// Ticks from the time of a mark to what the filter makes of it, at most.
+    /// Returns the ticks from the time of a mark to the ends of its filtered pulse, at most.
     pub(super) fn span(&self) -> usize {
         self.answer.len() / 2 / STEPS_OF_TICK
     }
 
-    /// What the filter makes of one photon so many ticks from the time of its mark.
+    /// Returns the filtered pulse of one photon, this number of `ticks` from the time of its mark.
     pub(super) fn answer(&self, ticks: f64) -> f32 {
         let place = ticks * STEPS_OF_TICK as f64 + (self.answer.len() / 2) as f64;
         let before = place.floor();
@@ -94,8 +93,8 @@ impl Pulse {
     /// How late a filtered pulse is, in ticks from the middle one of three samples of it that ascend to it
     /// and fall behind it, or nearly so.
     ///
-    /// The vertex of the parabola through them is not at the time of the mark but for a parabola: of which
-    /// time it tells is read off the pulse itself.
+    /// The vertex of the parabola through them is at the time of the mark only if the pulse is a parabola. So
+    /// the time that a vertex stands for is read off the pulse itself.
     pub(super) fn late(&self, samples: [f32; 3]) -> f64 {
         let Some(vertex) = vertex(samples.map(f64::from)) else { return 0.0 };
         interpolate(&self.vertices, vertex)
@@ -149,7 +148,7 @@ impl Pulse {
     }
 }
 
-/// Where a pulse goes through a code.
+/// A point at which a pulse goes through a code.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
     pub code: f32,
@@ -162,19 +161,20 @@ const MOST_PHOTONS: f64 = 41.0;
 /// How often the logarithm of the number of photons is bounded by halves: to a ten-thousandth.
 const HALVINGS: usize = 20;
 
-/// The pulse so many steps from its middle; 0 beyond its ends.
+/// Returns the pulse at this `step` from its middle; 0 beyond its ends.
 fn sampled(fine: &[f32], middle: usize, step: i64) -> f32 {
     usize::try_from(middle as i64 + step).ok().and_then(|at| fine.get(at)).copied().unwrap_or(0.0)
 }
 
-/// Where the parabola through three samples, a tick apart, is highest; `None` where it is nowhere.
+/// Returns the place at which the parabola through three samples, a tick apart, is highest; `None` if there
+/// is none.
 fn vertex([before, here, behind]: [f64; 3]) -> Option<f64> {
     let bent = before - 2.0 * here + behind;
     (bent < 0.0).then(|| 0.5 * (before - behind) / bent)
 }
 
-/// How many ticks before and behind the middle the pulse is at a share of its highest: pairs of −ln of
-/// the share, ascending, and ticks, until it rises again or ends.
+/// Returns the edges of a pulse, before and behind its middle. Each has pairs of −ln of a share of its
+/// highest, ascending, and the ticks to the middle there, until the pulse rises again or ends.
 fn edges(fine: &[f32]) -> [Vec<(f64, f64)>; 2] {
     let middle = fine.len() / 2;
     let highest = (0..fine.len()).fold(0, |most, at| if fine[at] > fine[most] { at } else { most });
@@ -247,8 +247,8 @@ mod tests {
         assert_eq!(pulse.late([f32::INFINITY; 3]), 0.0);
     }
 
-    /// Samples of the pulse at every phase, clipped at 100 codes: both its edges tell the time and how many
-    /// photons there were, whatever the codes are in which they are told.
+    /// Samples of the pulse at every phase, clipped at 100 codes. Its two edges tell the time and the number
+    /// of photons, whatever codes they are sampled at.
     #[test]
     fn how_late_a_clipped_pulse_is_follows_from_its_edges() {
         let pulse = pulse();

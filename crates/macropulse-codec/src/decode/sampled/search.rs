@@ -1,4 +1,4 @@
-//! What may be a return: lags at which the marks of a word stand out together.
+//! Possible returns: lags at which the marks of a word stand out together.
 
 use super::filter::Filtered;
 use super::{Band, Mark, Rule, Sum};
@@ -12,8 +12,8 @@ const MOST: usize = 16;
 pub(super) struct Candidate {
     pub shot: usize,
     pub lag: i64,
-    /// By what candidates are ordered: light that is there for certain comes first. Of light that is
-    /// clipped, how strong it is is not known, and the nearer one is likely to be the stronger.
+    /// Order of the candidates: light that is there for certain comes first. The strength of clipped light is
+    /// not known, and the nearer one is likely to be the stronger.
     pub rank: f32,
 }
 
@@ -31,7 +31,7 @@ pub(super) fn candidates((band, rule): (&Band, &Rule), filtered: &Filtered) -> V
     all
 }
 
-/// What the search for one shot after another needs.
+/// The search for one shot after another, with its memory.
 pub(super) struct Search<'a> {
     band: &'a Band<'a>,
     rule: &'a Rule,
@@ -79,7 +79,7 @@ impl<'a> Search<'a> {
     fn candidates_of(&mut self, shot: usize, all: &mut Vec<Candidate>) {
         self.look_for(shot);
         let (Some(&first), Some(&last)) = (self.marks.first(), self.marks.last()) else { return };
-        // Lags of which a mark is in the record.
+        // Lags at which a mark is in the record.
         let from = (-last).max(0);
         let until = (self.open.len() as i64 - first).min(self.band.lags);
         let before = all.len();

@@ -23,22 +23,22 @@ pub(super) fn in_time(filtered: &Filtered, counted: &[Mark], pulse: &Pulse) -> f
     pulse.late(about)
 }
 
-/// What is known of pulses of which samples are clipped.
+/// Measurements of pulses with clipped samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Clipped {
     /// How late they came, in ticks.
     pub late: f64,
     /// Photons of one of them, about.
     pub photons: f32,
-    /// Whether they are of one light.
+    /// True if they are of one light.
     pub is_one: bool,
 }
 
-/// The time of the marks that count if samples there are clipped, from their edges; the
-/// median of the marks. `None` where none is clipped.
+/// Returns the time of the marks that count if samples there are clipped, from their edges; the median of the
+/// marks. `None` if none is clipped.
 ///
-/// A clipped pulse lasts for many ticks, so that marks of several lights may lie in those of one word. But the
-/// marks of one light rise together. Where another pulse ends in one of them, that one seems to rise
+/// A clipped pulse lasts for many ticks, so that marks of several lights may lie in those of one word. But
+/// the marks of one light rise together. If another pulse ends in one of them, that one seems to rise
 /// earlier, and tells no time; none rises later.
 ///
 /// Clipped samples at which the signal tells nothing, its `doubt` being infinite, are those of stray light or
@@ -65,7 +65,7 @@ pub(super) fn clipped(
         let rises = crossing(codes, sampling, (before, 0.5));
         let falls = match sampling.held_ticks {
             0 => crossing(codes, sampling, (behind, -0.5)),
-            // What follows is no edge: the pulse fell below full scale so much earlier.
+            // This sample is no edge: the pulse fell below full scale earlier, by the ticks held.
             held => Crossing {
                 code: f32::from(sampling.full_scale),
                 tick: behind as f64 - f64::from(held) - 0.5,
@@ -87,7 +87,7 @@ pub(super) fn clipped(
     })
 }
 
-/// What a clipped mark tells, in ticks from where it is found.
+/// Measurements of a clipped mark, in ticks from where it is found.
 #[derive(Debug, Clone, Copy)]
 struct Told {
     /// The last sample before it is clipped.
@@ -99,8 +99,8 @@ struct Told {
 /// Marks of one light are first clipped at the same tick, or noise makes it the next one.
 const TOGETHER: i64 = 1;
 
-/// Where a pulse is at a code, from the sample `at` beside clipped ones: where that sample is, or, if it is
-/// too dark to tell, at full scale, by half a tick `inwards`.
+/// Returns the code that a pulse has at the sample `at` beside clipped ones, and the tick there. If that
+/// sample is too dark to tell, it is full scale, half a tick `inwards`.
 fn crossing(codes: &[i16], sampling: &Sampling, (at, inwards): (usize, f64)) -> Crossing {
     let (code, full) = (f32::from(codes[at]), f32::from(sampling.full_scale));
     match code >= TOLD * full {
@@ -134,7 +134,8 @@ mod tests {
         libm::expf(-ticks * ticks / 2.0) / 10.0
     }
 
-    /// The time told of pulses of 10⁶ photons at tick 20 and so much, after which the signal swings through.
+    /// Returns the time found for a pulse of 10⁶ photons at tick 20 + `phase`, after which the signal swings
+    /// through.
     fn told(phase: f32, swings_to: Option<i16>) -> Option<Clipped> {
         let sampling = sampling();
         let code = |tick: usize| (1e6 * shape(tick as f32 - 20.0 - phase)).min(1000.0) as i16;
@@ -170,8 +171,8 @@ mod tests {
         assert!(told(&[], &[], &[]).is_none());
     }
 
-    /// Two pulses, of which the other comes so much later than the word says. Where it ended in earlier light,
-    /// which is clipped for longer, the one that rises later tells the time.
+    /// Two pulses; the other one comes `later` ticks behind its place in the word. If it ends in earlier
+    /// light, which is clipped for longer, the one that rises later tells the time.
     #[test]
     fn clipped_marks_of_one_light_rise_together() {
         let (sampling, pulse) = (sampling(), Pulse::new(&sampling()));

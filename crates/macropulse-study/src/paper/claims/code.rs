@@ -1,4 +1,4 @@
-//! What the paper says of its codes and payloads.
+//! Claims of the paper on its codes and payloads.
 
 use crate::paper::claim::{Claim, Verdict, said};
 use crate::paper::measured::{Payloads, Timing, Words};

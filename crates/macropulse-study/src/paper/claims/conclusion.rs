@@ -17,7 +17,7 @@ pub(super) fn claims(measured: &Measured) -> Vec<Claim> {
     claims
 }
 
-/// What is proposed.
+/// Judges the sentences on the proposal.
 fn proposal(measured: &Measured) -> Vec<Claim> {
     let found = &measured.on_paper;
     let (timing, payloads, outlook) = (&found.timing, &found.payloads, &found.outlook);
@@ -103,7 +103,7 @@ fn proposal(measured: &Measured) -> Vec<Claim> {
     ]
 }
 
-/// What is missing, with its factors.
+/// Lists the failed checks with their factors.
 fn missing(lacks: &[(&'static str, f64)]) -> String {
     let word = |(name, factor): &(&str, f64)| match *factor {
         factor if factor >= 100.0 => format!("{name} fails by a factor of {factor:.0}"),
@@ -115,7 +115,7 @@ fn missing(lacks: &[(&'static str, f64)]) -> String {
     }
 }
 
-/// What it is good for.
+/// Judges the sentences on uses.
 fn uses(measured: &Measured) -> Vec<Claim> {
     let light = &measured.on_paper.light;
     let seen = |sensor, distance| measured.experiment.at(sensor, distance);
@@ -186,7 +186,7 @@ fn uses(measured: &Measured) -> Vec<Claim> {
     ]
 }
 
-/// What is still to be done.
+/// Judges the sentences on further work.
 fn wishes(measured: &Measured) -> Vec<Claim> {
     let light = &measured.on_paper.light;
     let outlook = &measured.on_paper.outlook;

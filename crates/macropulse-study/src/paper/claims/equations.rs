@@ -1,4 +1,4 @@
-//! What Eqs. 1, 3 and 4 give when they are tried.
+//! Results of Eqs. 1, 3 and 4 when they are tried.
 
 use crate::paper::claim::{Claim, said};
 use crate::paper::measured::Equations;

@@ -1,4 +1,4 @@
-//! What the paper says of its simulation.
+//! Claims of the paper on its simulation.
 
 use crate::paper::claim::{Claim, Verdict, in_three, said};
 use crate::paper::experiment::{DISTANCES, SENSORS};
@@ -117,7 +117,7 @@ fn falls(found: &Experiment) -> Claim {
     )
 }
 
-/// Whether at every distance the sensor with more points has the smaller range error.
+/// Judges whether at every distance the sensor with more points has the smaller range error.
 fn more_points(found: &Experiment) -> Claim {
     let (mut pairs, mut as_said) = (0, 0);
     for distance in DISTANCES {
@@ -229,8 +229,8 @@ fn tyres(found: &Experiment) -> Claim {
     )
 }
 
-/// Whether a vehicle can be recognised where the paper says so, and cannot where it says so, by
-/// either measure of what there is to see.
+/// Judges whether a vehicle can be recognised exactly where the paper says so. There are two measures: the
+/// rows on the car and the root of its points.
 fn picture(
     found: &Experiment,
     distance: u32,
@@ -243,7 +243,7 @@ fn picture(
     let (mut asked, mut as_said) = (0, 0);
     for seen in &here {
         let should = match (seen.sensor, distance) {
-            // Of these at 70 m the paper only says that the shape is less well defined.
+            // The paper only says that the shape is less well defined for these at 70 m.
             (PROPOSED | "peregrine", 70) => continue,
             (PROPOSED, _) | (_, 30 | 50) => true,
             _ => false,

@@ -1,4 +1,4 @@
-//! What the paper says of beam, mirror, eyes and reach.
+//! Claims of the paper on beam, mirror, eyes and reach.
 
 use crate::paper::claim::{Claim, Verdict, said};
 use crate::paper::measured::{Light, Timing};

@@ -1,5 +1,5 @@
-//! What the paper says, judged by what was measured. Nothing is measured here: the same numbers
-//! give the same verdicts, and other ones others.
+//! Claims of the paper, judged by measurements. Nothing is measured here: verdicts depend on the numbers
+//! alone.
 
 mod code;
 mod conclusion;
@@ -13,7 +13,7 @@ pub use experiment::RECOGNISED;
 use super::claim::Claim;
 use super::measured::{Measured, OnPaper};
 
-/// The rows of which the verdict follows from no number, because the sentence has none to measure.
+/// Rows whose verdict follows from no number, because the sentence has none to measure.
 pub const NOT_MEASURED: [&str; 2] = ["end-robots", "end-surroundings"];
 
 /// All rows.

@@ -1,4 +1,4 @@
-//! What the paper says of time, converters and the HDL-64E.
+//! Claims of the paper on time, converters and the HDL-64E.
 
 use crate::paper::claim::{Claim, Verdict, said};
 use crate::paper::measured::{Converters, Head, Timing};

@@ -46,7 +46,7 @@ pub struct Words {
     pub unaligned_bit_errors: [f64; 2],
     /// Other users that the row on interference counts.
     pub others: u32,
-    /// Most marks that so many others can add at once at the peak of C1.
+    /// Most marks that `others` users can add at once at the peak of C1.
     pub interference: u32,
     /// Sequences of Table 1 that begin with 0.
     pub zero_first: usize,
@@ -143,7 +143,7 @@ pub struct Payloads {
     pub aliases: usize,
     /// Words that pixels are sent with in turn.
     pub word_modulus: u32,
-    /// Shots between two of the same word, at least, if the word were the column modulo so many.
+    /// Fewest shots between two of the same word, if the word were the column modulo `word_modulus`.
     pub column_clash: u32,
     /// Shots between two of the same column.
     pub column_apart: u32,
@@ -196,8 +196,8 @@ impl Payloads {
     }
 }
 
-/// The fewest shots between two of the same word, if the word of a shot is its column modulo
-/// `modulus`: at the end of a row the last columns stand before the first of the next.
+/// Returns the fewest shots between two of the same word, if the word of a shot is its column modulo
+/// `modulus`. At the end of a row, the last columns come before the first of the next.
 fn column_clash(columns: u32, modulus: u32) -> u32 {
     let word = |shot: u32| shot % columns % modulus;
     let apart = |shot: u32| (1..=modulus).find(|step| word(shot + step) == word(shot));

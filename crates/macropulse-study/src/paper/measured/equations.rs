@@ -16,16 +16,16 @@ const MODULATION: f64 = 2e6;
 /// Period of a frequency sweep, s, and its excursion, Hz.
 const SWEEP: (f64, f64) = (2e-3, 1.5e9);
 
-/// What the equations give.
+/// Results of the equations.
 #[derive(Debug, Clone)]
 pub struct Equations {
     /// The range of the target.
     pub range: f64,
-    /// What Eq. 1 makes of the phase of a wave of modulated amplitude, mixed down from samples.
+    /// Range by Eq. 1 from the phase of a wave of modulated amplitude, mixed down from samples.
     pub amplitude: f64,
     /// Range at which that phase comes round.
     pub phase_wraps: f64,
-    /// What it makes of a triangular sweep if B is the beat, T the period, Δf the excursion.
+    /// Range by Eq. 1 from a triangular sweep if B is the beat, T the period, Δf the excursion.
     pub frequency: f64,
     /// The same with Δf the difference between what is sent and received, as printed.
     pub frequency_printed: f64,
@@ -35,9 +35,9 @@ pub struct Equations {
     pub peak: u32,
     /// Pairs of words and lags tried in Eq. 4.
     pub tried: u64,
-    /// Of these, how many do not fulfil Θ(l) = C(l) + C(l − N).
+    /// Number of those that do not fulfil Θ(l) = C(l) + C(l − N).
     pub wrong_with_minus: u64,
-    /// And how many do not fulfil Θ(l) = C(l) + C(l + N).
+    /// Number of those that do not fulfil Θ(l) = C(l) + C(l + N).
     pub wrong_with_plus: u64,
 }
 

@@ -1,11 +1,11 @@
-//! What the experiment found, as plain numbers.
+//! Results of the experiment, as plain numbers.
 
 use crate::paper::experiment::Trial;
 use crate::paper::receivers::Comparison;
 use crate::paper::walls::Wall;
 use macropulse::points::Outcome;
 
-/// What the experiment found.
+/// Results of the experiment.
 #[derive(Debug, Clone, Default)]
 pub struct Experiment {
     /// Every sensor at every distance.
@@ -49,16 +49,16 @@ pub struct Seen {
     pub error: f64,
     /// Converters busy at a time, at most.
     pub busy: u32,
-    /// Detection events lost because all were.
+    /// Detection events lost because all converters were busy.
     pub lost: u64,
 }
 
-/// What one receiver makes of one condition.
+/// Result of one receiver under one condition.
 #[derive(Debug, Clone)]
 pub struct Share {
     /// The sensor.
     pub sensor: &'static str,
-    /// What the detector loses.
+    /// The detector, named by its losses.
     pub detector: &'static str,
     /// The receiver.
     pub receiver: &'static str,
@@ -99,12 +99,13 @@ impl Experiment {
         }
     }
 
-    /// What `sensor` saw at `distance` metres.
+    /// Returns the car as `sensor` saw it at `distance` metres.
     pub fn at(&self, sensor: &str, distance: u32) -> Option<&Seen> {
         self.seen.iter().find(|seen| seen.sensor == sensor && seen.distance == distance)
     }
 
-    /// What `receiver` makes of `sensor` behind `detector`; NaN if that was not tried.
+    /// Returns the share of pixels that `receiver` gets right for `sensor` with `detector`; NaN if that was
+    /// not tried.
     pub fn right(&self, sensor: &str, detector: &str, receiver: &str) -> f64 {
         let is = |s: &&Share| (s.sensor, s.detector, s.receiver) == (sensor, detector, receiver);
         self.shares.iter().find(is).map_or(f64::NAN, |share| share.right)

@@ -1,4 +1,4 @@
-//! What was measured for the claims, as plain numbers; how it is judged stands in `claims`.
+//! Measurements for the claims, as plain numbers. `claims` judges them.
 //!
 //! Lengths are in metres, times in seconds, angles in radians, energies in joules.
 
@@ -22,7 +22,7 @@ use super::receivers::Comparison;
 use super::walls::Wall;
 use macropulse::design::Design;
 
-/// What follows from the sensors alone, without an experiment.
+/// Numbers that follow from the sensors alone, without an experiment.
 #[derive(Debug, Clone)]
 pub struct OnPaper {
     /// Code words and their correlations.
@@ -39,12 +39,13 @@ pub struct OnPaper {
     pub light: Light,
     /// The HDL-64E.
     pub head: Head,
-    /// What the conclusion hopes for.
+    /// Hopes of the conclusion, tried on the ready sensors.
     pub outlook: Outlook,
 }
 
 impl OnPaper {
-    /// Of the sensor of the paper, `design`, and the ready sensors it is held against.
+    /// Computes the numbers of the sensor of the paper, `design`, and of the ready sensors it is compared
+    /// with.
     ///
     /// # Errors
     /// If the sensor has no prime code or no raster; none of the ready sensors is refused, unless
@@ -66,11 +67,11 @@ impl OnPaper {
 /// Everything the claims are judged by.
 #[derive(Debug, Clone)]
 pub struct Measured {
-    /// What follows from the sensors alone.
+    /// Numbers that follow from the sensors alone.
     pub on_paper: OnPaper,
-    /// What the experiment found.
+    /// Results of the experiment.
     pub experiment: Experiment,
-    /// What the text makes of the blocks of Fig. 7.
+    /// Roles of the blocks of Fig. 7 in the text.
     pub roles: Vec<Role>,
 }
 

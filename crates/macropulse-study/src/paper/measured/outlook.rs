@@ -1,4 +1,4 @@
-//! What the conclusion hopes for, among the ready sensors.
+//! Hopes of the paper's conclusion, tried on the ready sensors.
 
 use super::Error;
 use macropulse::codec::code::CodeWord;
@@ -8,14 +8,14 @@ use macropulse::predict::Forecaster;
 use macropulse::predict::verdict::{Wanted, checks};
 use macropulse::units::tof_from_range;
 
-/// What the conclusion hopes for.
+/// Hopes of the conclusion, in numbers.
 #[derive(Debug, Clone)]
 pub struct Outlook {
     /// Width of the field of the paper's sensor.
     pub field: f64,
     /// Directions and scans per second that it is to have.
     pub directions: (u32, u32, f64),
-    /// What its honest version lacks, each with the factor that is missing; empty if it closes.
+    /// Checks that the honest version of that sensor fails, each with the missing factor; empty if it closes.
     pub lacks: Vec<(&'static str, f64)>,
     /// Width of the field of `coded-360`.
     pub field_360: f64,
@@ -49,10 +49,10 @@ pub struct Closing {
     pub aperture: f64,
     /// Probability that it sees 10 % at the range of the paper, by day, forecast.
     pub pd: f64,
-    /// What it lacks by the budget; empty if it closes.
+    /// Checks of the budget that it fails, each with the missing factor; empty if it closes.
     pub lacks: Vec<(&'static str, f64)>,
-    /// Channels that a lidar with its mirror needs which waits for echoes from its range, and from as far as
-    /// its light is followed.
+    /// Channels that a lidar with the same mirror needs if it waits for echoes: from the range of the paper,
+    /// and from as far as its light is followed.
     pub waiting: [u32; 2],
 }
 
@@ -64,7 +64,7 @@ impl Closing {
         let wanted = Wanted { reflectance: 0.1, range, pd: 0.9, false_points: 1e-4 };
         let found = checks(&forecaster, &by_night, &wanted);
         let lacks = found.iter().filter(|check| !check.holds());
-        // With more channels the shots of one are so much farther apart.
+        // The time between shots of one channel grows in proportion to the number of channels.
         let of_channel = design.scan.shortest_period() / f64::from(design.channels());
         let waits = |range: f64| (tof_from_range(range) / of_channel).ceil() as u32;
         Ok(Self {

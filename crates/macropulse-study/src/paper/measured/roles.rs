@@ -1,11 +1,11 @@
-//! What the text of the paper makes of the blocks of its Fig. 7, read from its section 3.
+//! Roles that the text of the paper gives the blocks of its Fig. 7, read from its section 3.
 
-/// Which end of the link a block belongs to.
+/// End of the link that a block belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// What makes the light that arrives: emitter and channel.
+    /// Emitter and channel: they make the light that arrives.
     Transmitter,
-    /// What is made of it: the detector.
+    /// The detector: it responds to that light.
     Receiver,
 }
 
@@ -14,15 +14,16 @@ pub enum Part {
 pub struct Role {
     /// Its colour.
     pub block: &'static str,
-    /// Where it belongs by what the text says it computes.
+    /// Part it belongs to, by the quantity that the text says it computes.
     pub belongs_to: Part,
-    /// For which part the text repeats it in the proposed lidar.
+    /// Part for which the text repeats it in the proposed lidar.
     pub repeated_for: Part,
 }
 
-/// Pulses and noise are the emitter's (green), the probability of firing over time follows from the
-/// channel (upper blue); jitter (lower blue) and the time of firing (red) are the detector's. The
-/// text then repeats the first two "for the receiver part", the last two "for the transmitter part".
+/// Returns the roles as printed. Pulses and noise belong to the emitter (green). The probability of firing
+/// over time follows from the channel (upper blue). Jitter (lower blue) and the time of firing (red) belong
+/// to the detector. The text then repeats the first two "for the receiver part", the last two "for the
+/// transmitter part".
 pub(super) fn printed() -> Vec<Role> {
     use Part::{Receiver, Transmitter};
     [

@@ -35,7 +35,7 @@ pub struct Timing {
     pub rated_range: f64,
     /// Length of a macropulse.
     pub macropulse: f64,
-    /// Scans per second with as many directions, without waiting.
+    /// Scans per second of all its directions, without waiting.
     pub rate: f64,
     /// The same of one beam that waits for each echo.
     pub waiting_rate: f64,
@@ -101,8 +101,8 @@ impl Timing {
     }
 }
 
-/// The share of places that may be lit by chance, if of `marks` all but a tenth are to be believed
-/// among `places`, one false answer in 10⁴ shots being accepted.
+/// Returns the greatest share of places that chance may light. An answer needs all but a tenth of `marks` at
+/// one of `places`; one false answer in 10⁴ shots is accepted.
 fn bearable(marks: usize, places: f64) -> f64 {
     let least = marks - marks / 10;
     let (mut low, mut high) = (0.0, 1.0);
@@ -151,11 +151,12 @@ impl Converters {
     }
 }
 
-/// Most marks of [`IN_FLIGHT`] successive shots, of each those of its densest `chips` chips.
+/// Returns the most marks of [`IN_FLIGHT`] successive shots, counted in the densest `chips` chips of each.
 fn most_marks(design: &Design, chips: u32) -> u32 {
     let coding = design.emission.coding();
     let (columns, modulus) = (u64::from(design.scan.columns), u64::from(coding.word_modulus));
-    // Where a row begins with the word of another one that came before, all comes again.
+    // The sequence repeats once a row begins with the word that began an earlier row: after `modulus` rows at
+    // most.
     let shots = columns * modulus + IN_FLIGHT as u64;
     let densest = |shot: u64| {
         let label = (shot % columns) as u16;
@@ -198,21 +199,21 @@ pub struct Light {
     pub mirror_takes: f64,
     /// The rated range.
     pub range: f64,
-    /// Greatest tilt of a surface there of which a chip comes back whole.
+    /// Greatest tilt of a surface there that returns a chip whole.
     pub tilt: f64,
     /// Chips over which one is smeared there by a surface at 45°.
     pub smear: f64,
-    /// Whether the sensor leaves out the width of the beam.
+    /// True if the sensor leaves out the width of the beam.
     pub is_line: bool,
-    /// Whether it leaves out the limits of eye safety.
+    /// True if it leaves out the limits of eye safety.
     pub is_unlimited: bool,
-    /// Whether it leaves out the bandwidth of the detector.
+    /// True if it leaves out the bandwidth of the detector.
     pub is_unbounded: bool,
     /// Energy that class 1 leaves a macropulse.
     pub energy: f64,
     /// The same without the factor of repeated exposures.
     pub energy_lax: f64,
-    /// What one macropulse alone may have.
+    /// Energy that class 1 allows one macropulse alone.
     pub energy_alone: f64,
     /// Mean power of class 1, in watts.
     pub power: f64,
@@ -298,7 +299,7 @@ impl Light {
     }
 }
 
-/// Seed of what is simulated for numbers on paper.
+/// Seed of the simulations for numbers on paper.
 const SEED: u64 = 1;
 
 /// Shots at the wall by night, about: nine of ten are then known to 0.7 %.

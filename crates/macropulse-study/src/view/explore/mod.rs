@@ -1,7 +1,7 @@
 //! A page to explore clouds: one HTML file, with the points in it, that needs nothing beside it.
 //!
-//! What the page does is written in the files beside this one, as a browser reads them: `page.html`,
-//! `explore.css`, and the scripts. The points are drawn by WebGL 2.
+//! The files beside this one hold the page as a browser reads it: `page.html`, `explore.css`, and the
+//! scripts. The points are drawn by WebGL 2.
 
 mod packed;
 mod scan;
@@ -70,9 +70,9 @@ impl Explorer {
         self.files.push(path.to_owned());
     }
 
-    /// Adds a cloud under the name `label`, if there is room: the page holds 32 million characters of
-    /// them. Of a cloud of more than two million points every second, third and so on is shown. The
-    /// page says what it leaves out.
+    /// Adds a cloud under the name `label`, if there is room: the page holds 32 million characters of clouds.
+    /// If a cloud has more than two million points, every second, third and so on is shown. The page says
+    /// what it leaves out.
     ///
     /// Lengths are kept to 0.1 mm, times to 0.1 ns, intensities to 0.0001; all of them coarser by tens
     /// where they span more than a thousand million steps.

@@ -15,7 +15,7 @@ use serde::Serialize;
 /// Codes stay below this, so that the difference of any two fits 32 bits with its sign.
 const MOST_CODES: f64 = (1_u32 << 30) as f64;
 
-/// What a column is called, its unit, and the step to which its values are kept.
+/// Name and unit of a column, and the step to which its values are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Kept {
     pub name: &'static str,
@@ -23,10 +23,10 @@ pub(super) struct Kept {
     pub step: f64,
 }
 
-/// A packed column. Its codes are 0 where there is no value, else 1 + (value − `low`) / `step`,
-/// rounded. Kept are, from 0 on, the differences of successive codes, those below 0 as
-/// 2·|difference| − 1 and the others as 2·difference: first the lowest byte of all of them, then the
-/// next, `bytes` in all.
+/// A packed column. Its codes are 0 where there is no value, else 1 + (value − `low`) / `step`, rounded. The
+/// column keeps the differences of successive codes, from 0 on. A difference below 0 is kept as
+/// 2·|difference| − 1, any other as 2·difference. The lowest byte of all of them comes first, then the next,
+/// `bytes` in all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Column {
     name: &'static str,

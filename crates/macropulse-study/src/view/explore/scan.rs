@@ -59,7 +59,7 @@ impl Scan {
         }
     }
 
-    /// What it is called in the page.
+    /// Its name in the page.
     pub fn label(&self) -> &str {
         &self.label
     }
@@ -70,8 +70,8 @@ impl Scan {
     }
 }
 
-/// What is kept of each return: the attributes that files have, and which returns the image shows. The
-/// ring is the row, and a list has no pixels.
+/// The kept attributes of each return: those that files have, and a flag for the returns that the image
+/// shows. The ring is left out because it is the row. A list has no rows and columns, as it has no pixels.
 fn attributes(cloud: &PointCloud, has_image: bool) -> Vec<(Kept, Entries<'_>)> {
     let is_kept = |attribute: &Attribute| match attribute {
         Attribute::Ring => false,

@@ -27,11 +27,11 @@ pub(in crate::design) struct OpticsFile {
     /// Width of the optical filter, nm; left out with a [chirp], whose laser selects the light.
     #[schemars(range(min = 0.001, max = 1000))]
     filter_nm: Option<f64>,
-    /// What a detector looks at; left out with a [chirp].
+    /// Field of view of a detector; left out with a [chirp].
     field: Option<FieldFile>,
 }
 
-/// What a detector looks at, as typed.
+/// Field of view of a detector, as typed.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 enum FieldFile {
@@ -44,7 +44,7 @@ enum FieldFile {
     /// All pixels of a raster whose light may still be under way.
     #[serde(rename = "in-flight")]
     InFlight,
-    /// So many pixels of a raster, from that of the beam back.
+    /// This number of pixels of a raster, from that of the beam back.
     #[serde(rename = "co_scanned_pixels")]
     CoScannedPixels(#[schemars(range(min = 1))] f64),
     /// A round field about the cell of its pixel, mrad, full angle.
@@ -59,19 +59,18 @@ pub(in crate::design) struct SafetyFile {
     /// Distance of the eye, mm.
     #[schemars(range(min = 1, max = 1e5))]
     distance_mm: f64,
-    /// Whether the groups of shots that cross an eye, as the lines of a raster, count as repeated
-    /// exposures.
+    /// True if the groups of shots that cross an eye, as the lines of a raster, count as repeated exposures.
     count_lines: bool,
 }
 
-/// What the file says of a budget.
+/// The keys of a file that declare a budget.
 pub(in crate::design) struct BudgetFile<'a> {
     pub optics: Option<&'a OpticsFile>,
     pub safety: Option<&'a SafetyFile>,
     pub energy: Option<EnergyFile>,
 }
 
-/// What a budget is made of beside that.
+/// The other parts of a sensor that its budget depends on.
 pub(in crate::design) struct Parts<'a> {
     pub scan: &'a Scan,
     pub light: &'a Light,
@@ -192,8 +191,8 @@ impl Check<'_> {
         Ok(self.within(path, typed, 1e-3, 1e3)? * 1e-9)
     }
 
-    /// What each detector looks at: of a raster as the file says, of several detectors the cell of
-    /// its pixel or a cone about it.
+    /// Returns the field of view of each detector. A raster has that of the file. With several detectors it
+    /// is the cell of the pixel, or a cone about it.
     fn field(&self, optics: &OpticsFile, scan: &Scan) -> Result<Field, Error> {
         let Some(typed) = optics.field else {
             return Err(self.chain.lacks("optics.field", "missing field `field`"));
@@ -238,8 +237,8 @@ impl Check<'_> {
     }
 }
 
-/// How many pixels a round field about the beam reaches back, `width` pixels being its diameter:
-/// half of it and half the pixel that the beam is on, that pixel at least.
+/// Returns the number of pixels that a round field about the beam reaches back, with a diameter of `width`
+/// pixels. It is half the diameter and half the pixel that the beam is on, but at least that pixel.
 fn cone_pixels(width: f64) -> f64 {
     ((width + 1.0) / 2.0).max(1.0)
 }

@@ -1,8 +1,7 @@
 //! Keys that another setting makes meaningless: typing one is an error that names both.
 //!
-//! Only what a user has just typed counts: keys given with `--set`, and keys of the file itself
-//! where `--set` does not change what makes them meaningless. What a file inherits by `extends` may
-//! lie idle.
+//! Only keys that a user has just typed count: those given with `--set`, and those of the file itself unless
+//! `--set` changes what makes them meaningless. Keys that a file inherits by `extends` may lie idle.
 
 use super::SensorFile;
 use crate::design::detector::OF_SAMPLES;
@@ -30,7 +29,7 @@ impl Check<'_> {
     fn told(&self, idle: &Idle) -> Option<Error> {
         let because = match self.chain.typed(&idle.key)? {
             Typed::Set => true,
-            // What `--set` has just changed, the file could not know.
+            // The file could not know a setting that `--set` has just changed.
             Typed::File => self.chain.typed(idle.by) != Some(Typed::Set),
         };
         let message = format!("has no effect because of `{}`: {}", idle.by, idle.why);

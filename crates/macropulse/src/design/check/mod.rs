@@ -33,17 +33,17 @@ pub(in crate::design) struct SensorFile {
     pub version: u32,
     /// Short name.
     pub name: String,
-    /// What the sensor is, in one sentence.
+    /// Description of the sensor, in one sentence.
     #[serde(default)]
     pub summary: String,
     /// Effects that are left out.
     #[schemars(with = "Vec<Effect>")]
     pub idealised: Vec<String>,
-    /// Where and when the sensor looks: scans, ranges, and one scan pattern.
+    /// Directions and times at which the sensor looks: scans, ranges, and one scan pattern.
     pub scan: ScanFile,
     /// The light it sends.
     pub light: LightFile,
-    /// What its shots carry; leave the table out for shots without a code.
+    /// The code that its shots carry; leave the table out for shots without a code.
     pub code: Option<CodeFile>,
     /// Pulses that a shot without a code repeats; leave the table out for single ones.
     pub burst: Option<BurstFile>,
@@ -72,12 +72,12 @@ pub(in crate::design) struct SensorFile {
 }
 
 impl SensorFile {
-    /// Whether its detector puts out a signal, for a comparator or an ADC.
+    /// Returns true if its detector puts out a signal, for a comparator or an ADC.
     fn has_signal(&self) -> bool {
         self.detector.only().is_some_and(|only| only.file.has_signal())
     }
 
-    /// Whether its light comes in pulses.
+    /// Returns true if its light comes in pulses.
     fn is_pulsed(&self) -> bool {
         self.modulation.is_none() && self.chirp.is_none()
     }
@@ -94,8 +94,7 @@ const VERSION: u32 = 1;
 /// Largest range error, m, up to which a return may count as right.
 const WIDEST: f64 = 0.35;
 
-/// Where sun and air were written before they belonged to the scene: tables of the sensor file, and
-/// what to say of each.
+/// Tables of the sensor file that held sun and air before these belonged to the scene.
 const MOVED: [&str; 3] = ["sun", "atmosphere", "environment"];
 
 /// Detectors that are described by parts now: their former names, and what to write.
@@ -113,7 +112,7 @@ const FORMER: [(&str, &str); 2] = [
     ),
 ];
 
-/// Keys of a scene file, of which a sensor has none.
+/// Keys of a scene file that no sensor has.
 const OF_SCENES: [&str; 4] = ["object", "ground", "material", "interferers"];
 
 pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
@@ -141,14 +140,14 @@ pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
     if faults.is_empty() { Ok(design) } else { Err(faults.into_error(chain)) }
 }
 
-/// A sensor each section of which is right; what they ask of each other is checked behind it. `None` if
-/// something is wrong, and then all that is, as far as it does not follow from what was wrong before, is in
-/// `faults`.
+/// Returns a sensor whose sections are right, each by itself. The caller checks the remaining demands between
+/// them. If something is wrong, the result is `None`, and `faults` holds all faults that do not follow from
+/// earlier ones.
 fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<Design> {
     let file = &typed;
     let effects = faults.keep(check.effects(&file.idealised));
     let off = |effect| effects.as_ref().is_some_and(|effects| effects.contains(&effect));
-    // Of a list that cannot be read nothing follows for the motion of the beam.
+    // A list that cannot be read says nothing about the motion of the beam.
     let moves = effects.is_some() && !off(Effect::MirrorMotion);
     let scan = faults.keep(check.scan(&file.scan, moves));
     let adc = file.adc();
@@ -209,7 +208,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     };
     let detector =
         budget.as_ref().and_then(|_| faults.keep(check.detector(&file.detector, &before)));
-    // Without a detector the receiver has no timing, of which none of its limits depends.
+    // Without a detector the receiver has no timing, but none of its limits depends on that.
     let spread = detector.as_ref().and_then(|detector| detector.spread_of(&light));
     let jitter = detector.as_ref().map_or(0.0, |detector| detector.model().jitter());
     let inputs = Inputs {
@@ -244,7 +243,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     }
     let (budget, detector, receiver) = (budget?, detector?, receiver?);
     let right_within = right_within?.unwrap_or_else(|| resolved(&detector, &light, clock));
-    // What has no effect belongs neither to the sensor nor to its digest.
+    // Keys without effect belong neither to the sensor nor to its digest.
     let said = check.chain.clone().without(&effectless::idle_keys(file, &idealised));
     let warnings = scan.model().notes().to_vec();
     Some(Design {
@@ -267,12 +266,12 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     })
 }
 
-/// What was found wrong so far.
+/// The faults found so far.
 #[derive(Default)]
 struct Faults(Vec<Error>);
 
 impl Faults {
-    /// What was checked, if nothing was wrong with it.
+    /// Returns the checked value; keeps the error and returns `None` if something was wrong with it.
     fn keep<T>(&mut self, checked: Result<T, Error>) -> Option<T> {
         checked.map_err(|error| self.0.push(error)).ok()
     }
@@ -287,8 +286,8 @@ impl Faults {
     }
 }
 
-/// Range error, m, up to which a return of this sensor is called right if its file does not say:
-/// four standard deviations of a single detection event, a whole tick counted as one of its own,
+/// Returns the range error, m, up to which a return of this sensor is called right if its file does not say.
+/// It is four standard deviations of a single detection event, with a whole tick counted as one of its own:
 ///
 /// c/2 · 4·√(σ² + tick²)
 ///
@@ -348,7 +347,7 @@ fn typed_wrongly(chain: &Chain, misfit: &Misfit) -> Error {
 }
 
 impl Check<'_> {
-    /// What a shot sends.
+    /// Returns the light that a shot sends.
     fn emission(&self, file: &SensorFile, scan: &Scan, clock: Clock) -> Result<Emission, Error> {
         let coding = self.coding(file.code.as_ref(), scan, clock)?;
         if !file.is_pulsed() {
@@ -361,8 +360,8 @@ impl Check<'_> {
         Ok(Emission::Burst(self.burst(burst, coding, clock)?))
     }
 
-    /// The same where its light is modulated, in power or in frequency, which goes with no pulses and with a detector that
-    /// follows it.
+    /// The same for light that is modulated, in power or in frequency. It allows no pulses, and needs a
+    /// detector that follows it.
     fn without_pulses(
         &self,
         file: &SensorFile,
@@ -412,8 +411,8 @@ impl Check<'_> {
         }
     }
 
-    /// Whether bursts and histograms go together: who repeats pulses adds up their counts, in bins that lie within
-    /// a cycle and hold the range gate.
+    /// Checks that bursts and histograms go together. A sensor that repeats pulses adds up their counts, in
+    /// bins that lie within a cycle and hold the range gate.
     fn cycles(
         &self,
         file: &SensorFile,
@@ -452,7 +451,8 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Whether the beam stands while a shot is sent, as it is simulated: where it `moves`, that has to be idealised.
+    /// Checks that the beam stands while a shot is sent, as it is simulated. If it `moves`, that has to be
+    /// idealised.
     fn stands(&self, emission: &Emission, scan: &Scan, moves: bool) -> Result<(), Error> {
         if matches!(emission, Emission::Marks(_)) || !moves || scan.is_one_flash() {
             return Ok(());
@@ -601,7 +601,8 @@ mod tests {
         }
     }
 
-    /// What a file puts behind a photodiode replaces what the sensor has there that it extends.
+    /// A comparator or an ADC that a file puts behind a photodiode replaces that of the sensor that it
+    /// extends.
     #[test]
     fn a_comparator_replaces_an_adc_and_an_adc_a_comparator() {
         let open = |extends: &str, text: &str| {
@@ -625,8 +626,8 @@ mod tests {
         assert!(told.contains("comparator: has no effect because of `detector`"), "{told}");
     }
 
-    /// What the files of the ready sensors say, or what followed for those that did not: 1.5 mm of the
-    /// paper's. Each is reproduced to a third.
+    /// Values that the files of the ready sensors state, or that followed for files that did not: 1.5 mm of
+    /// the paper's. Each is reproduced to a third.
     #[test]
     fn what_a_sensor_resolves_is_near_what_its_file_calls_right() {
         for (name, typed) in [

@@ -27,7 +27,7 @@ pub(super) struct File {
     /// that adds none.
     #[schemars(range(min = 1, max = 1e6))]
     noise_factor: f64,
-    /// Whether both quadratures are recorded, which tell a beat from its negative. Left out: false.
+    /// True if both quadratures are recorded, which tell a beat from its negative. Left out: false.
     quadratures: Option<bool>,
 }
 
@@ -42,7 +42,7 @@ pub struct Coherent {
     pub sensitivity: Sensitivity,
     /// Noise over the shot noise of the local oscillator, without sunlight.
     pub noise_factor: f64,
-    /// Whether it tells a beat from its negative.
+    /// True if it tells a beat from its negative.
     pub quadratures: bool,
     /// Wavelength, m.
     pub wavelength: f64,
@@ -80,13 +80,13 @@ impl Typed for File {
 }
 
 impl Coherent {
-    /// Noise over the shot noise of the local oscillator where `background` photons of sunlight are detected per second
-    /// in its mode: one photon per sample is as much noise as the local oscillator makes.
+    /// Noise over the shot noise of the local oscillator, with `background` photons of sunlight detected per
+    /// second in its mode. One photon per sample makes the same noise as the local oscillator.
     pub fn noise(&self, background: f64) -> f64 {
         self.noise_factor + background / self.spectrum.sample_hz
     }
 
-    /// What a receiver knows of its peaks.
+    /// Description of the peaks for a receiver.
     pub fn method(&self, least_share: f64, max_speed: f64, false_alarm: f64) -> BeatMethod {
         let ramps = self.chirp.ramps();
         let recorded: f64 = self.chirp.shares().iter().sum();
@@ -102,13 +102,14 @@ impl Coherent {
         }
     }
 
-    /// Bins of a ramp that lasts so many seconds: of all frequencies, or of those above zero.
+    /// Bins of a ramp that lasts `seconds`: of all frequencies, or of those above zero.
     pub fn bins(&self, seconds: f64) -> u32 {
         let samples = self.spectrum.samples(seconds);
         if self.quadratures { samples } else { samples / 2 }
     }
 
-    /// Power from which on a peak is recorded: noise exceeds it in as many bins of a ramp as are wanted.
+    /// Power from which on a peak is recorded: noise exceeds it in the wanted number of bins of a ramp,
+    /// `false_peaks`.
     pub fn least_power(&self) -> f64 {
         let most = self.chirp.ramps().iter().map(|ramp| self.bins(ramp.seconds)).max();
         libm::log(f64::from(most.unwrap_or(1)) / self.spectrum.false_peaks).max(1.0)

@@ -1,9 +1,9 @@
-//! What makes detection events of the signal behind an amplifier: a comparator with a threshold,
-//! `[comparator]`.
+//! Detection events from the signal behind an amplifier: a comparator with a threshold, `[comparator]`.
 //!
-//! A pulse of amplitude A is A·exp(−t²/2s²), s the response over √(8·ln 2), and has noise on it that is taken
-//! to have the autocorrelation exp(−t²/2v²), v its memory: it crosses the threshold, TNR times its rms,
-//! exp(−TNR²/2)/(2π·v) times per second \[Rice44\]. White noise behind the amplifier has just that.
+//! A pulse of amplitude A is A·exp(−t²/2s²), s the response over √(8·ln 2). The noise on it is taken to have
+//! the autocorrelation exp(−t²/2v²), v its memory. It crosses the threshold, TNR times its rms,
+//! exp(−TNR²/2)/(2π·v) times per second \[Rice44\]. White noise behind the amplifier has just that
+//! autocorrelation.
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -46,7 +46,7 @@ pub fn threshold_over_noise(memory: f64, rate: f64) -> Option<f64> {
     (share <= 1.0).then(|| SQRT_2 * (-libm::log(share)).sqrt())
 }
 
-/// What tells the times of pulses on the sum of all.
+/// A comparator that times pulses on the summed signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Comparator {
     /// The moment it tells.
@@ -55,7 +55,7 @@ pub struct Comparator {
     pub hysteresis: f64,
 }
 
-/// What a photodiode with a comparator is set to under the light it sees. Amplitudes are in detected photons: in
+/// Setting of a photodiode with a comparator, for the light it sees. Amplitudes are in detected photons: in
 /// electrons before multiplication.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearSetting {
@@ -84,9 +84,9 @@ pub const FRACTION: f64 = 0.5;
 /// has been crossed even by a pulse that just reaches it.
 pub const DELAY: f64 = 1.0;
 
-/// By how much, on average, the signal about the peak of a pulse at the threshold is higher than at the
-/// peak itself, in detected photons: noise that rises there puts the maximum beside it,
-/// (noise·s/v)²/(2·threshold) to the first order.
+/// Mean height of the signal about the peak of a pulse at the threshold, above the peak itself, in detected
+/// photons. Noise that rises there puts the maximum beside the peak, (noise·s/v)²/(2·threshold) higher to the
+/// first order.
 pub(super) fn bump(setting: &LinearSetting) -> f64 {
     let steep = setting.noise * RMS_OF_FWHM * setting.response / setting.memory;
     steep.powi(2) / (2.0 * setting.threshold)
@@ -112,8 +112,8 @@ impl Comparator {
                 let slope = (-ago * pulse(ago) + FRACTION * now * pulse(now)) * amplitude / rms;
                 let common = libm::exp(-(DELAY * setting.response / setting.memory).powi(2) / 2.0);
                 let variance = 1.0 + FRACTION * FRACTION - 2.0 * FRACTION * common;
-                // The slope is as noisy as noise of that memory is steep, 1/v for each part. Of the ratio
-                // of a normal variable to 1 + x·g the variance is 1 + 3x² + 15x⁴ times as large.
+                // The slope is as noisy as noise of that memory is steep, 1/v for each part. The ratio of a
+                // normal variable to 1 + x·g has a variance that is 1 + 3x² + 15x⁴ times as large.
                 let steepness = (1.0 + FRACTION * FRACTION).sqrt() / setting.memory;
                 let x = setting.noise * steepness / slope;
                 let by_slope = (1.0 + 3.0 * x.powi(2) + 15.0 * x.powi(4)).min(2.0);

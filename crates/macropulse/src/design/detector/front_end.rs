@@ -1,4 +1,4 @@
-//! What is in front of a comparator or an analogue-to-digital converter: a photodiode, the filter and the
+//! The part in front of a comparator or an analogue-to-digital converter: a photodiode, the filter and the
 //! noise of its amplifier.
 //!
 //! Amplitudes are in detected photons: a mark of one, whose light is a Gaussian pulse, has the peak 1 behind
@@ -71,9 +71,9 @@ impl FrontEnd {
         background + self.dark_current / ELEMENTARY_CHARGE
     }
 
-    /// Spectral density of the noise per charge of a detected photon, under `background` detections per
-    /// second: the white part, and the variance of the part that rises with the frequency in units of that of
-    /// white noise of density 1.
+    /// Noise per charge of a detected photon, under `background` detections per second, in two parts. The
+    /// first is the spectral density of the white part. The second is the variance of the part that rises
+    /// with the frequency, in units of that of white noise of density 1.
     fn densities(&self, background: f64) -> [f64; 2] {
         let of_charge = (ELEMENTARY_CHARGE * self.gain).powi(-2);
         let white =
@@ -115,7 +115,7 @@ impl FrontEnd {
         let rms = self.photon_rms();
         let [white, rising] = self.densities(background);
         let delay = apart / rms;
-        // Of white noise, and by its second derivative of noise that rises with the frequency.
+        // The shape for white noise; noise that rises with the frequency has its second derivative.
         let shape = libm::exp(-delay * delay / 4.0) / (4.0 * PI.sqrt() * rms);
         let steepness = 0.5 - delay * delay / 4.0;
         let peak = self.mark_rms() * (2.0 * PI).sqrt();

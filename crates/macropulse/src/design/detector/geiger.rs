@@ -12,16 +12,16 @@ use super::{
 use crate::design::{Error, Light};
 use crate::units::{fs_from_s, s_from_fs};
 
-/// Cells start so many dead times before the first owned shot. They start in the mixture of armed
-/// and blind that steady light leaves, and after one dead time without light of its own a cell is
-/// armed whatever it was: four leave less than a percent of a hundredth.
+/// Number of dead times before the first owned shot at which cells start. They start in the mixture of armed
+/// and blind that steady light leaves. After one dead time without light of its own a cell is armed, whatever
+/// it was before. Four leave less than a hundredth of a percent.
 const DEAD_TIMES: i64 = 4;
 
 /// `[detector.geiger]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
-    /// What it sees, declared; where the list `idealised` names `link-budget`.
+    /// Declared sensitivity; if the list `idealised` names `link-budget`.
     sensitivity: Option<SensitivityFile>,
     /// Detections per photon; with a link budget.
     #[schemars(range(min = 1e-6, max = 1))]
@@ -158,17 +158,15 @@ impl File {
 }
 
 impl Geiger {
-    /// Share of the cells that are armed at any moment, 1/(1 + r·τ/N): each of N cells is blind for
-    /// the dead time τ after each of its firings, and r = `falling` photons per second fall on all
-    /// of them.
+    /// Share of the cells that are armed at any moment, 1/(1 + r·τ/N). Each of N cells is blind for the dead
+    /// time τ after each of its firings. All of them together get r = `falling` photons per second.
     fn armed(&self, falling: f64) -> f64 {
         let each = falling / f64::from(self.cells);
         1.0 / (1.0 + each * s_from_fs(self.dead_fs))
     }
 
-    /// Probability that any of the cells fires at a mark of which `photons` are detected on average,
-    /// where each is armed with probability `armed`, independently of the others:
-    /// 1 − (1 − a·(1 − exp(−n/N)))^N.
+    /// Probability that any of the cells fires at a mark with n = `photons` detected on average. Each cell is
+    /// armed with the probability a = `armed`, independently of the others: 1 − (1 − a·(1 − exp(−n/N)))^N.
     fn any_cell(&self, armed: f64, photons: f64) -> f64 {
         let cells = f64::from(self.cells);
         let fires = -armed * libm::expm1(-photons / cells);
@@ -230,17 +228,17 @@ impl Model for Geiger {
         self.armed(falling)
     }
 
-    /// A cell is armed at an echo if it has not fired in its dead time τ before: not at one of the echoes
-    /// in that time, k = ⌊τ/P⌋ of them where they come every P, and not by itself. With h = 1 − exp(−n/N), r
-    /// the dark and background counts per cell and second, and a the share of the time in which a cell is
-    /// armed, all of these exclude each other:
+    /// A cell is armed at an echo if it has not fired in its dead time τ before. It must have fired neither
+    /// at one of the k = ⌊τ/P⌋ echoes in that time, which come every P, nor by itself. Let h = 1 − exp(−n/N),
+    /// r the dark and background counts per cell and second, and a the share of the time in which a cell is
+    /// armed. All of these exclude each other:
     ///
     /// * armed at an echo: e = 1 − k·h·e − r·τ·a;
     /// * armed at any time: a = 1 − (h·e/P + r·a)·τ.
     ///
-    /// With T since the gate opened N cells are silent with q = A(T)^N, A(T) = 1 − r·a·T up to τ and (1 −
-    /// r·a·τ)·exp(−r·(T − τ)) beyond, and each of them is then armed with g = e/A(T), or 1: the echo is seen
-    /// with q·(1 − (1 − g·(1 − exp(−n/N)))^N).
+    /// Let T be the time since the gate opened. N cells are silent with q = A(T)^N, A(T) = 1 − r·a·T up to τ
+    /// and (1 − r·a·τ)·exp(−r·(T − τ)) beyond. Each of them is then armed with g = e/A(T) up to τ and 1
+    /// beyond. The echo is seen with q·(1 − (1 − g·(1 − exp(−n/N)))^N).
     fn first_event(&self, awaited: &Awaited) -> FirstEvent {
         let &Awaited { since, photons, false_rate, falling, period, converted, .. } = awaited;
         let cells = f64::from(self.cells);

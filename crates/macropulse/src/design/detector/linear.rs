@@ -11,7 +11,7 @@ use crate::design::Light;
 /// Terms of a Poisson sum that are less than this share of all are left out.
 const NEGLIGIBLE: f64 = 1e-15;
 
-/// From so many photons on, their number passes for a normal variable.
+/// From this number of photons on, the number passes for a normal variable.
 const MANY: f64 = 1e4;
 
 /// A photodiode with an amplifier and a comparator. Its noise, and with it the threshold, depends on
@@ -26,7 +26,7 @@ pub struct Linear {
     pub false_alarm: f64,
     /// Standard deviation of the timing of the converter's input alone, s.
     pub jitter: f64,
-    /// What tells the time of a pulse on the summed signal; `None` where every mark is judged alone.
+    /// The comparator on the summed signal; `None` if every mark is judged alone.
     pub comparator: Option<Comparator>,
 }
 
@@ -84,11 +84,11 @@ impl LinearSetting {
         ((variance + squares) / count - (walks / count).powi(2)).max(0.0).sqrt()
     }
 
-    /// Probability that a mark of which `photons` are detected on average crosses the threshold,
-    /// summed over the photons k that come:
-    /// Σ_k e^(−n)·n^k/k! · Q((threshold − k)/√(k·(F − 1) + noise²)). No photon, no event.
+    /// Probability that a mark with n = `photons` detected on average crosses the threshold, summed over the
+    /// photons k that come: Σ_k e^(−n)·n^k/k! · Q((threshold − k)/√(k·(F − 1) + noise²)). No photon, no
+    /// event.
     ///
-    /// With so much noise of the amplifier that the photons' own does not matter it is the
+    /// If the noise of the amplifier is so large that the photons' own does not matter, it is the
     /// ½·erfc((TNR − SNR)/√2) of textbooks.
     fn crossing(&self, photons: f64) -> f64 {
         let Self { noise, excess, .. } = *self;
@@ -115,8 +115,8 @@ impl Model for Linear {
         self.sensitivity
     }
 
-    /// Of a mark that only just crosses the threshold: noise over the slope, τ·noise/threshold, with
-    /// the jitter of the input. It does not depend on how large the noise is.
+    /// That of a mark that only just crosses the threshold: noise over the slope, τ·noise/threshold, with the
+    /// jitter of the input. It does not depend on how large the noise is.
     fn jitter(&self) -> f64 {
         let setting = self.setting(0.0);
         match setting.noise > 0.0 {
@@ -125,6 +125,7 @@ impl Model for Linear {
         }
     }
 
+    /// The light of a pulse is followed as a whole, so its length displaces no event.
     fn resolution(&self, _: &Light) -> f64 {
         self.jitter()
     }
@@ -151,7 +152,6 @@ impl Model for Linear {
         self.setting(lit.background).timing_of_seen(lit.photons)
     }
 
-    /// What light the pulse has is followed as a whole: its length is that of the pulse.
     fn summary(&self) -> String {
         format!(
             "comparator; threshold {:.2} times the noise; {}; {:.0e} false alarms/s",
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// With neither noise nor excess noise an event takes as many photons as the threshold says.
+    /// With neither noise nor excess noise an event takes the number of photons that the threshold says.
     #[test]
     fn without_noise_it_is_the_tail_of_poisson() {
         let found = linear(2.5, 1e-9, 1.0).crossing(2.0);

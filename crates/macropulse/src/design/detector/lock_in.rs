@@ -113,12 +113,13 @@ impl LockIn {
         self.full_well / (f64::from(self.full_scale) - self.dark_code)
     }
 
-    /// Variance of the electrons of a tap that holds so many on average: of photons, reading and rounding.
+    /// Variance of the electrons of a tap that holds `electrons` on average: of photons, reading and
+    /// rounding.
     pub fn variance(&self, electrons: f64) -> f64 {
         electrons + self.read_noise.powi(2) + self.electrons_per_code().powi(2) / 12.0
     }
 
-    /// What a receiver knows of its taps, with harmonics if it is to correct them.
+    /// Description of the taps for a receiver, with harmonics if it `corrects` them.
     pub fn method(&self, corrects: bool, false_alarm: f64) -> PhaseMethod {
         let modulation = &self.modulation;
         let tone = |(hz, contrast): (&f64, &f64)| {

@@ -57,7 +57,7 @@ macro_rules! kinds {
             /// Names of all tables `[detector.NAME]`.
             pub const NAMES: &[&str] = &[$($name),+];
 
-            /// What its kind answers.
+            /// The model of its kind.
             pub fn model(&self) -> &dyn Model {
                 match self {
                     $(Self::$Kind(detector) => detector,)+
@@ -65,7 +65,7 @@ macro_rules! kinds {
             }
         }
 
-        /// `[detector]` as typed: a table for each kind, of which a sensor has one.
+        /// `[detector]` as typed: a table for each kind. A sensor has one of them.
         #[derive(Debug, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub(in crate::design) struct DetectorFile {
@@ -143,7 +143,7 @@ pub(in crate::design) struct Given<'a> {
     pub file: &'a dyn Typed,
 }
 
-/// What the keys of a kind say before they are checked.
+/// The keys of a kind before they are checked.
 pub(in crate::design) trait Typed {
     /// Detections per photon, if the file says it, under the key `efficiency`.
     fn efficiency(&self) -> Option<f64>;
@@ -159,12 +159,12 @@ pub(in crate::design) trait Typed {
         Follows { bandwidth: true, neighbouring_chips: true }
     }
 
-    /// Whether it puts out no more than one event per shot.
+    /// True if it puts out no more than one event per shot.
     fn is_single_stop(&self) -> bool {
         false
     }
 
-    /// Whether it puts out a signal, for a comparator or an ADC.
+    /// True if it puts out a signal, for a comparator or an ADC.
     fn has_signal(&self) -> bool {
         false
     }
@@ -185,10 +185,10 @@ pub(in crate::design) struct Idle {
 }
 
 impl Idle {
-    /// Of a kind that has an efficiency for the one and a sensitivity for the other.
+    /// For a kind with an efficiency for a link budget and a sensitivity without one.
     const EITHER: Self = Self { declared: &["efficiency"], counted: &["sensitivity"] };
 
-    /// Of a kind that needs all of its keys.
+    /// For a kind that needs all of its keys.
     const NONE: Self = Self { declared: &[], counted: &[] };
 }
 
@@ -200,8 +200,8 @@ pub(in crate::design) struct Follows {
     pub neighbouring_chips: bool,
 }
 
-/// What every kind of detector answers, SI units throughout. Counts and photons are detected ones;
-/// `background` is the sunlight that it sees, in detections per second.
+/// Model of a detector of any kind, SI units throughout. Counts and photons are detected ones; `background`
+/// is the sunlight that it sees, in detections per second.
 pub trait Model {
     /// How much light it gets.
     fn sensitivity(&self) -> Sensitivity;
@@ -238,13 +238,13 @@ pub trait Model {
         0
     }
 
-    /// Whether an event may depend on other light than that which makes it: on what came before, or
-    /// on what else comes while a gate is open.
+    /// True if an event may depend on other light than its own: on earlier light, or on any other light while
+    /// a gate is open.
     fn has_state(&self) -> bool {
         self.memory_fs() > 0
     }
 
-    /// Why it cannot be simulated in so much sunlight, and what to do, if it cannot.
+    /// The reason why it cannot be simulated in this sunlight, and a remedy; `None` if it can.
     fn refusal(&self, _background: f64) -> Option<String> {
         None
     }
@@ -273,15 +273,15 @@ pub trait Model {
         1.0
     }
 
-    /// What a receiver finds that takes the first event in its gate.
+    /// The result of a receiver that takes the first event in its gate.
     fn first_event(&self, awaited: &Awaited) -> FirstEvent {
         FirstEvent::without_memory(awaited)
     }
 
-    /// What it is, in half a line for people.
+    /// Description in half a line, for people.
     fn summary(&self) -> String;
 
-    /// What becomes of the counts of sunlight: the end of a sentence about them, for people.
+    /// The role of the counts of sunlight: the end of a sentence about them, for people.
     fn in_sunlight(&self) -> &'static str;
 }
 
@@ -367,7 +367,7 @@ pub struct Awaited {
     pub converted: f64,
 }
 
-/// What comes first in a range gate.
+/// The first event in a range gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FirstEvent {
     /// Probability that a dark or background count comes before the echo.
@@ -377,16 +377,16 @@ pub struct FirstEvent {
 }
 
 impl FirstEvent {
-    /// Of a detector without memory: nothing comes first with exp(−K), K the dark and background
-    /// counts until the echo.
+    /// For a detector without memory: nothing comes before the echo with the probability exp(−K), K the dark
+    /// and background counts until the echo.
     fn without_memory(awaited: &Awaited) -> Self {
         let counts = awaited.false_rate * awaited.since;
         Self { is_false: -libm::expm1(-counts), is_echo: awaited.mark_pd * libm::exp(-counts) }
     }
 }
 
-/// Length of a micropulse of `light`, rms, s, as far as it is followed: by so much is one photon of
-/// it displaced.
+/// Length of a micropulse of `light`, rms, s, as far as it is followed. One photon of it is displaced by this
+/// length.
 fn length_followed(light: &Light) -> f64 {
     light.spread.unwrap_or(0.0)
 }
@@ -395,8 +395,8 @@ fn length_followed(light: &Light) -> f64 {
 /// than 0.2 %.
 const SLICES: u32 = 32;
 
-/// Of a normal variable of such a `mean` and `spread`, where it lies above `threshold`: the middles of
-/// [`SLICES`] slices of equal probability, the highest first.
+/// Middles of [`SLICES`] slices of equal probability, the highest first, of a normal variable above
+/// `threshold`. The variable has this `mean` and `spread`.
 fn slices_above(threshold: f64, mean: f64, spread: f64) -> impl Iterator<Item = f64> {
     let spread = spread.max(f64::MIN_POSITIVE);
     let above = normal_tail((threshold - mean) / spread).max(f64::MIN_POSITIVE);

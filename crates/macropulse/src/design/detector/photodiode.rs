@@ -204,11 +204,11 @@ impl File {
         table.refuse_key("recovery_ns", message)
     }
 
-    /// The low cutoff as an angular frequency, 1/s, of a converter with so many `codes`.
+    /// The low cutoff as an angular frequency, 1/s, of a converter with this number of `codes`.
     ///
-    /// As a hundredth of the bandwidth it takes 2 % away from what follows a mark at once; more, and the pulse
-    /// would no longer be the one that the receiver knows. Nor does it know a baseline that comes back within a
-    /// sample.
+    /// A cutoff of a hundredth of the bandwidth at once takes 2 % away from the signal behind a mark. With
+    /// more, the pulse would no longer be the one that the receiver knows. Nor does the receiver know a
+    /// baseline that comes back within a sample.
     fn low_cutoff(
         &self,
         table: &Table,
@@ -239,8 +239,8 @@ impl File {
 }
 
 impl AdcFile {
-    /// From sample to sample, s. The receiver is told of a mark to [`REACH`] rms lengths, in [`STEPS_OF_TICK`]
-    /// steps a sample, of which it takes no more than [`Sampling::MOST_ENTRIES`].
+    /// From sample to sample, s. The receiver knows a mark to [`REACH`] rms lengths, in [`STEPS_OF_TICK`]
+    /// steps a sample. It takes no more than [`Sampling::MOST_ENTRIES`] of these steps.
     fn sample(&self, check: &Check, front_end: &FrontEnd) -> Result<f64, Error> {
         let sample = check.within("adc.sample_ps", self.sample_ps, 1e-3, 1e9)? * 1e-12;
         let rms = front_end.mark_rms();

@@ -13,7 +13,7 @@ use crate::design::{Error, Light};
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
-    /// What it sees, declared; where the list `idealised` names `link-budget`.
+    /// Declared sensitivity; if the list `idealised` names `link-budget`.
     sensitivity: Option<SensitivityFile>,
     /// Detections per photon; with a link budget.
     #[schemars(range(min = 1e-6, max = 1))]

@@ -1,7 +1,7 @@
 //! A photodiode with an amplifier and an analogue-to-digital converter (ADC).
 //!
-//! Nothing in it decides: what it hands over are codes, and whether a mark is there is the receiver's
-//! question. What stands here as the probability of a mark is that of one mark by itself.
+//! Nothing in it decides: it hands over codes, and whether a mark is there is the receiver's question. The
+//! probability of a mark is here that of one mark by itself.
 
 use std::f64::consts::TAU;
 
@@ -12,24 +12,24 @@ use super::{FrontEnd, Lit, Model, Noise, Sensitivity};
 use crate::design::Light;
 use crate::units::{FS_PER_S, fs_from_s};
 
-/// Marks that stand alone are called found where they are so many deviations of the noise high.
+/// A mark that stands alone is called found if it is this number of deviations of the noise high.
 const FOUND: f64 = 5.0;
 
-/// Ticks of a block: at the beginning of each the baseline is worked out anew from the blocks before it, so
-/// that it is the same in whichever band the block is worked out. Of 4096, adding up the blocks costs
-/// nothing beside the samples, and what is worked out too much is a few microseconds.
+/// Ticks of a block. At the beginning of each the baseline is worked out anew from the blocks before it, so
+/// that it is the same in every band with this block. With 4096, adding up the blocks costs nothing beside
+/// the samples, and only a few microseconds are worked out in excess.
 pub const BASELINE_BLOCK: i64 = 4096;
 
-/// What the baseline forgets is less than this share of a step of the converter.
+/// The baseline forgets light until less than this share of a step of the converter is left.
 const FORGOTTEN: f64 = 1.0 / 16.0;
 
 /// A baseline that remembers more ticks would take more time to be found than the light it is of.
 pub(super) const MOST_REMEMBERED: f64 = 16_777_216.0;
 
-/// Light shows where it is so many deviations of the noise high.
+/// Light shows if it is this number of deviations of the noise high.
 const SHOWS: f64 = 4.0;
 
-/// A pulse is told to the receiver to so many of its rms lengths: there it is 4·10⁻⁶ of its height.
+/// The receiver knows a pulse to this number of its rms lengths: there it is 4·10⁻⁶ of its height.
 pub(super) const REACH: f64 = 5.0;
 
 /// A photodiode with an amplifier and an analogue-to-digital converter.
@@ -37,7 +37,7 @@ pub(super) const REACH: f64 = 5.0;
 pub struct Sampled {
     /// Mean photons detected per mark at the reference target.
     pub sensitivity: Sensitivity,
-    /// What comes before the converter.
+    /// The photodiode and its amplifier.
     pub front_end: FrontEnd,
     /// Standard deviation of the time of each mark, s.
     pub jitter: f64,
@@ -56,7 +56,7 @@ pub struct Sampled {
     pub low_cutoff: f64,
 }
 
-/// Time constants after which all of a range of so many `codes` is forgotten.
+/// Time constants after which all of a range of this number of `codes` is forgotten.
 pub(super) fn remembered(codes: f64) -> f64 {
     libm::log(codes / FORGOTTEN)
 }
@@ -67,9 +67,8 @@ impl Sampled {
         self.front_end.noise(background)
     }
 
-    /// What the amplifier puts out while it is at its limit, in detected photons: the whole range of the
-    /// converter, so that what is clipped is told as such until the baseline lies as far below zero as the
-    /// lowest code does.
+    /// Output of the amplifier at its limit, in detected photons: the whole range of the converter. A clipped
+    /// signal thus reads as clipped until the baseline lies as far below zero as the lowest code does.
     pub fn limit(&self) -> f64 {
         f64::from(i32::from(self.codes.1) - i32::from(self.codes.0)) * self.step
     }
@@ -90,8 +89,8 @@ impl Sampled {
         libm::ceil(ticks / BASELINE_BLOCK as f64) as i64
     }
 
-    /// Time, s, from the beginning of a clipped pulse or of a shorter one of `photons` behind the amplifier to
-    /// where it ends, times how high it is: what it takes from the baseline is that times `low_cutoff`.
+    /// Length, s, of a pulse of `photons` behind the amplifier, clipped or not, times its height. The pulse
+    /// takes this times `low_cutoff` from the baseline.
     pub fn charge(&self, photons: f64) -> f64 {
         let rms = self.front_end.mark_rms();
         let full = f64::from(self.codes.1) * self.step;
@@ -104,15 +103,16 @@ impl Sampled {
         }
     }
 
-    /// Time, s, before and behind a mark of stray light in which it shows above the noise: s·√(2·ln(n/v)), with the rms
-    /// length s of the mark, its n photons, and v, four deviations of the noise.
+    /// Time, s, before and behind a mark of stray light in which it shows above the noise: s·√(2·ln(n/v)).
+    /// The mark has n photons and the rms length s, and v is four deviations of the noise.
     pub fn stray_shows(&self, background: f64) -> f64 {
         let over = (self.stray / (SHOWS * self.rms_noise(background))).max(1.0);
         self.front_end.mark_rms() * (2.0 * libm::log(over)).sqrt()
     }
 
-    /// The brightest stray light of a mark, in detected photons, that is over `time` seconds behind it: it no longer
-    /// shows above the noise in the dark, nor holds the amplifier at its limit because it was clipped.
+    /// The brightest stray light of a mark, in detected photons, that is over `time` seconds behind it. By
+    /// then it no longer shows above the noise in the dark, nor holds the amplifier at its limit because it
+    /// was clipped.
     pub fn most_stray(&self, time: f64) -> f64 {
         let rms = self.front_end.mark_rms();
         let falls_to =
@@ -137,8 +137,8 @@ impl Sampled {
         self.ticks(self.recovery)
     }
 
-    /// What the receiver knows of it, which listens again `blank` seconds after a mark of its own and
-    /// `recovery` seconds behind a clipped sample, and decides by `least_marks` or more.
+    /// Description of the detector for a receiver. The receiver listens again `blank` seconds after a mark of
+    /// its own and `recovery` seconds behind a clipped sample. It decides by `least_marks` or more.
     pub fn sampling(&self, (blank, recovery): (f64, f64), least_marks: u16) -> Sampling {
         let rms = self.front_end.mark_rms() / self.sample * STEPS_OF_TICK as f64;
         let half = libm::ceil(REACH * rms) as i32;
@@ -158,9 +158,9 @@ impl Sampled {
         }
     }
 
-    /// Standard deviation, s, of the time of a mark of `photons`: the jitter of its own, the noise over
-    /// the slope, s·σ/n with the rms length s of the pulse, and the photons that came in its length,
-    /// s_p·√(F/n).
+    /// Standard deviation, s, of the time of a mark of `photons`, from three parts. They are the jitter of
+    /// its own, the noise over the slope, and the photons that came in its length. The noise adds s·σ/n with
+    /// the rms length s of the pulse, and the photons add s_p·√(F/n).
     fn timing(&self, photons: f64, background: f64) -> f64 {
         let by_noise = self.front_end.mark_rms() * self.rms_noise(background) / photons;
         let length = self.front_end.pulse * crate::units::RMS_OF_FWHM;
@@ -174,7 +174,7 @@ impl Model for Sampled {
         self.sensitivity
     }
 
-    /// Of a mark that is only just found by itself.
+    /// That of a mark that is only just found by itself.
     fn jitter(&self) -> f64 {
         self.timing(FOUND * self.rms_noise(0.0).max(1.0), 0.0)
     }
@@ -187,8 +187,8 @@ impl Model for Sampled {
         self.front_end.response()
     }
 
-    /// The baseline, with the block in which a band begins and one for pulses that are not over there, and
-    /// before that a clipped pulse that may still hold the amplifier.
+    /// The memory of the baseline, with the block in which a band begins and one for pulses that are not over
+    /// there. Before that comes a clipped pulse that may still hold the amplifier.
     fn settles_fs(&self) -> i64 {
         let baseline_fs = match self.remembered_blocks() {
             0 => 0,

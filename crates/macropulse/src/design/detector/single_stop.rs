@@ -15,7 +15,7 @@ use crate::units::RMS_OF_FWHM;
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
-    /// What it sees, declared; where the list `idealised` names `link-budget`.
+    /// Declared sensitivity; if the list `idealised` names `link-budget`.
     sensitivity: Option<SensitivityFile>,
     /// Detections per photon; with a link budget.
     #[schemars(range(min = 1e-6, max = 1))]
@@ -34,7 +34,7 @@ pub(super) struct File {
     jitter_ps: f64,
 }
 
-/// Light without end, of a detector that never misses, is so many photons where a number is needed.
+/// Number of photons that replaces the infinite light of a detector that never misses, if a number is needed.
 pub const PLENTY: f64 = 1e9;
 
 /// A detector that fires once, when enough photons of one shot have come.
@@ -54,7 +54,7 @@ pub struct SingleStop {
     pub pulse: f64,
 }
 
-/// What a detector that fires once per shot does under the light it sees.
+/// Setting of a detector that fires once per shot, for the light it sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SingleStopSetting {
     /// Photons needed to fire; 1 is a Geiger detector.
@@ -128,9 +128,9 @@ fn photons_for(pd: f64, needed: u32, noise: f64) -> f64 {
 impl SingleStop {
     /// The setting of a detector that sees `background` detections of steady light per second.
     ///
-    /// Where one photon is enough every one of them fires it. Where more are needed, their mean is
-    /// taken off (the amplifier passes no steady current) and their fluctuation is shot noise:
-    /// √(a² + b·τ), a the noise rms without light, b the background, τ the pulse.
+    /// If one photon is enough, every photon of that light fires it. If more are needed, their mean is taken
+    /// off (the amplifier passes no steady current) and their fluctuation is shot noise: √(a² + b·τ), a the
+    /// noise rms without light, b the background, τ the pulse.
     pub fn setting(&self, background: f64) -> SingleStopSetting {
         let &Self { firing_photons, noise_photons, false_rate, jitter, pulse, .. } = self;
         let (noise, false_rate) = match firing_photons {
@@ -142,14 +142,14 @@ impl SingleStop {
 }
 
 impl SingleStopSetting {
-    /// Whether it measures the photons of a pulse: not if the first of them fires it, as a Geiger
+    /// True if it measures the photons of a pulse. It does not if the first of them fires it, as in a Geiger
     /// cell.
     pub fn measures(&self) -> bool {
         self.needed > 1
     }
 
-    /// Probability that a detector which needs m photons fires at a mark of which n = `photons` are
-    /// detected on average, with a photons rms of noise: 1 − exp(−n) for m = 1 without noise, else
+    /// Probability that a detector fires at a mark with n = `photons` detected on average. The detector needs
+    /// m photons and has a photons rms of noise: 1 − exp(−n) for m = 1 without noise, else
     /// Q((m − n)/√(n + a²)).
     fn firing(&self, photons: f64) -> f64 {
         let (needed, noise, photons) = (f64::from(self.needed), self.noise, photons.min(PLENTY));
@@ -175,7 +175,7 @@ impl Model for SingleStop {
         libm::hypot(self.jitter, flank)
     }
 
-    /// What fires it in a gate decides what else could have.
+    /// The first event in a gate excludes all others.
     fn has_state(&self) -> bool {
         true
     }
@@ -197,9 +197,9 @@ impl Model for SingleStop {
         self.jitter
     }
 
-    /// Of the moment at which the m-th of k photons comes, about its mean: that of the m-th smallest of
-    /// k normal variables ([`normal_order`]), in rms lengths of a Gaussian pulse; over the numbers k of
-    /// those pulses that have so many, which are normal about the mean.
+    /// That of the moment at which the m-th of k photons comes, about its mean. It is that of the m-th
+    /// smallest of k normal variables ([`normal_order`]), in rms lengths of a Gaussian pulse. It is averaged
+    /// over pulses of m photons or more, whose numbers k are normal about the mean.
     fn mark_displacement(&self, lit: &Lit, light: &Light) -> f64 {
         let SingleStopSetting { needed, noise, .. } = self.setting(lit.background);
         let (needed, mean) = (f64::from(needed), lit.photons.min(PLENTY));

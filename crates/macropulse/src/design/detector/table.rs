@@ -27,16 +27,16 @@ pub(in crate::design) struct SensitivityFile {
     pd: f64,
 }
 
-/// What a detector gets to see.
+/// Parts of a sensor that are checked before its detector.
 pub(in crate::design) struct Before<'a> {
     pub scan: &'a Scan,
     pub light: &'a Light,
     pub emission: &'a Emission,
     pub readout: &'a Readout,
     pub budget: Option<&'a Budget>,
-    /// What compares the signal of a photodiode with a threshold.
+    /// The comparator for the signal of a photodiode.
     pub comparator: Option<&'a ComparatorFile>,
-    /// What samples it.
+    /// The converter that samples it.
     pub adc: Option<&'a AdcFile>,
 }
 
@@ -104,8 +104,8 @@ impl Table<'_> {
         }
     }
 
-    /// What is detected per mark: by the budget, or as declared under `sensitivity`, with `photons`
-    /// for what a probability of detection needs.
+    /// Photons detected per mark: by the budget, or as declared under `sensitivity`. `photons` gives the
+    /// number that a probability of detection needs.
     pub(super) fn sensitivity(
         &self,
         declared: Option<&SensitivityFile>,
@@ -125,7 +125,7 @@ impl Table<'_> {
         })
     }
 
-    /// What is detected per mark of the budget: of a white target at the rated range in clear air.
+    /// Photons detected per mark of the budget: from a white target at the rated range in clear air.
     pub(super) fn honest(&self, budget: &Budget) -> Sensitivity {
         let Before { scan, emission, .. } = self.before;
         let energy = budget.energy / emission.mean_pulses();

@@ -20,7 +20,7 @@ pub(crate) struct Lines {
     /// Lines drawn one after another: all of them where there is one beam, and 1 where all are drawn at
     /// once. More than one are evenly spaced, and alike above and below the horizon.
     pub in_turn: u32,
-    /// Whether every other line is drawn from the right to the left.
+    /// True if every other line is drawn from the right to the left.
     pub comes_back: bool,
 }
 
@@ -34,8 +34,8 @@ pub(crate) struct Line {
 
 /// Shots that a search may look at.
 const EFFORT: usize = 120_000;
-/// Most beams beside one that an aperture may hold together with it. Where there are more, light hardly depends on
-/// the place.
+/// Most beams beside one that an aperture may hold together with it. With more of them, light hardly depends
+/// on the place.
 const FEW: usize = 64;
 /// The most beams that are paired with others to find places that two beams share. They are spread evenly over the scan.
 const MOST_SHARED: usize = 4096;
@@ -50,7 +50,7 @@ pub(super) struct LineBeams<'a> {
     pub lines: &'a Lines,
     pub energies: &'a Energies,
     pub share: &'a Share,
-    /// Of the aperture, m.
+    /// Distance of the aperture, m.
     pub distance: f64,
 }
 
@@ -80,8 +80,8 @@ impl Field for LineBeams<'_> {
 
     /// In the middle of the columns, or where the brightest ones are.
     ///
-    /// Columns stand closer the higher a row lies, cos(elevation) of what they do at the horizon; near the
-    /// edge of the field less of the aperture is lit, but the columns stand closest.
+    /// Columns stand closer the higher a row lies: at cos(elevation) of their distance at the horizon. Near
+    /// the edge of the field less of the aperture is lit, but the columns stand closest.
     fn starts(&self, gap: f64, counted: f64) -> Vec<Aim> {
         let mut aims = Vec::new();
         for elevation in self.elevations(gap) {
@@ -153,8 +153,8 @@ impl Field for LineBeams<'_> {
         aims
     }
 
-    /// Near the ends of lines that go to and fro, where the aperture sees the end of one and the beginning
-    /// of the next at once; of a turning head whose columns differ, all.
+    /// Near the ends of lines that go to and fro: there the aperture sees the end of one line and the
+    /// beginning of the next at once. All around for a turning head whose columns differ.
     fn across(&self, gap: f64) -> Vec<f64> {
         let Lines { first, step, .. } = *self.lines;
         let last = first - step * f64::from(self.scan.columns - 1);
@@ -213,7 +213,8 @@ impl LineBeams<'_> {
         let rows = self.rows_within(elevation, reach);
         let mut azimuths = vec![self.brightest(&Lit { elevation, rows: rows.clone(), widest: PI })];
         if counted < self.scan.period() {
-            // So many columns pass within the time, if that is shorter than a line takes to cross.
+            // Half the angle of the columns that pass within the time, if that is shorter than a line takes
+            // to cross.
             let line = self.scan.period() / f64::from(self.lines.in_turn);
             let widest = counted / line * f64::from(self.scan.columns) * self.lines.step / 2.0;
             let number = self.nearest(elevation);
@@ -377,7 +378,7 @@ fn places(lowest: f64, highest: f64, gap: f64) -> Vec<f64> {
 
 /// Rows whose light passes an aperture.
 struct Lit {
-    /// Of the middle of the aperture, rad.
+    /// Elevation of the middle of the aperture, rad.
     elevation: f64,
     rows: Range<usize>,
     /// Light from further off than this in azimuth does not matter, rad.

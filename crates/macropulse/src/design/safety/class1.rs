@@ -20,7 +20,7 @@ pub enum Class1 {
     Cornea,
 }
 
-/// An opening through which light is judged, and for exposures of which length.
+/// An opening through which light is judged, and the durations of the exposures that it judges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Opening {
     /// Diameter, m.
@@ -29,7 +29,7 @@ pub struct Opening {
     pub durations: [f64; 2],
 }
 
-/// Where light is judged.
+/// The distance and the width of the opening through which light is judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Condition {
     /// Distance of the opening, m.
@@ -39,7 +39,7 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// Condition 3, the bare eye, so many metres away.
+    /// Returns condition 3, the bare eye, `distance` metres away.
     pub fn bare_eye(distance: f64) -> Self {
         Self { distance, widened: 1.0 }
     }

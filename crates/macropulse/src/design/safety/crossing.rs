@@ -13,7 +13,7 @@ use crate::design::budget::solid_angle;
 use crate::design::{Emission, Light, Scan};
 use crate::units::s_from_fs;
 
-/// What is sent in a scan, as eye safety counts it.
+/// The beams of a scan, as eye safety counts them.
 pub(crate) enum Beams {
     /// A beam for each pixel, line by line.
     Lines(Lines),
@@ -29,13 +29,13 @@ pub(in crate::design) struct Sender<'a> {
     pub scan: &'a Scan,
     pub light: &'a Light,
     pub emission: &'a Emission,
-    /// Where the eye is, and what it looks through.
+    /// The place of the eye, and the width of the opening before it.
     pub condition: Condition,
-    /// Whether groups of shots that cross the eye count as repeated exposures.
+    /// True if groups of shots that cross the eye count as repeated exposures.
     pub count_groups: bool,
 }
 
-/// What `sender` sends to an eye, where that sees most of it.
+/// Returns the exposure of an eye to `sender`, at the places where it sees most light.
 pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
     let Sender { scan, light, emission, .. } = sender;
     let energies = Energies::of(scan, emission.coding());

@@ -1,4 +1,4 @@
-//! What class 1 allows to the shots that cross an eye.
+//! The energy that class 1 allows to the shots that cross an eye.
 
 use super::class1::{Class1, LONGEST};
 
@@ -31,7 +31,7 @@ pub struct Crossings {
     pub shots: Vec<Crossing>,
 }
 
-/// What a sensor sends to an eye.
+/// The light that a sensor sends to an eye.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exposure {
     /// How far away the eye is, m.
@@ -48,7 +48,7 @@ pub struct Exposure {
     pub brightest_mark: f64,
     /// The largest share of a shot's energy within T_i.
     pub counted_as_one: f64,
-    /// Whether groups of shots that cross the eye count as repeated exposures, which brings in C5.
+    /// True if groups of shots that cross the eye count as repeated exposures, which brings in C5.
     pub count_groups: bool,
     /// The shots that cross the eye, by aperture and where the eye is.
     pub places: Vec<Crossings>,
@@ -76,7 +76,7 @@ impl Rule {
     pub const ALL: [Self; 6] =
         [Self::Mark, Self::SingleShot, Self::Group, Self::Scan, Self::Repeated, Self::Average];
 
-    /// What it is about, in a few words.
+    /// Returns its subject in a few words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mark => "one mark",
@@ -89,7 +89,7 @@ impl Rule {
     }
 }
 
-/// What one rule allows.
+/// The limit that one rule sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limit {
     /// The rule.
@@ -111,8 +111,8 @@ pub fn strictest(limits: &[Limit]) -> Option<&Limit> {
     limits.iter().min_by(|a, b| a.energy.total_cmp(&b.energy))
 }
 
-/// Of each rule the smallest of `limits`, the rules in the order of growing duration; a rule that none is
-/// of is left out.
+/// Returns the smallest of `limits` for each rule, in the order of growing duration. A rule without a limit
+/// is left out.
 pub fn strictest_of_each(limits: &[Limit]) -> Vec<Limit> {
     let of_rule = |rule: Rule| {
         let limits = limits.iter().filter(|limit| limit.rule == rule);
@@ -121,13 +121,13 @@ pub fn strictest_of_each(limits: &[Limit]) -> Vec<Limit> {
     Rule::ALL.into_iter().filter_map(of_rule).collect()
 }
 
-/// What each rule allows to `exposure`, the rules in the order of growing duration; a rule that no
+/// Returns the limit that each rule sets for `exposure`, in the order of growing duration. A rule that no
 /// exposure falls under is left out.
 ///
-/// Every run of shots that follow each other through an aperture, of a duration that is tried, has
-/// at most the energy of a single exposure that lasts as long: the sum of the energies of the shots
-/// times that of a mean shot ≤ AEL(t). Durations are tried from T_i on, each twice the one before,
-/// and whole numbers of scans, twice as many each time, to 100 s.
+/// The shots that follow each other through an aperture are judged in runs of several durations. Each run has
+/// at most the energy of a single exposure that lasts equally long. So the sum of the energies of its shots,
+/// times that of a mean shot, is ≤ AEL(t). The durations begin at T_i and are doubled each time. Whole
+/// numbers of scans are tried, too, doubled each time, to 100 s.
 pub fn limits(class: &Class1, exposure: &Exposure) -> Vec<Limit> {
     let mut all = Vec::new();
     let mut add = |rule, shots: f64, brightness: f64, duration| {
@@ -192,12 +192,13 @@ impl<'a> Train<'a> {
         [self.group(), self.within_a_scan(), self.repeated(), self.average()]
     }
 
-    /// Whether this aperture judges exposures of `duration` seconds.
+    /// Returns true if this aperture judges exposures of `duration` seconds.
     fn judges(&self, duration: f64) -> bool {
         duration > self.durations[0] && duration <= self.durations[1]
     }
 
-    /// What `factor` times the limit of `duration` leaves to a mean shot, where `sum` crosses.
+    /// Returns the limit of `rule` on a mean shot if `sum` crosses, from `factor` times the limit of
+    /// `duration`.
     fn limit(
         &self,
         rule: Rule,
@@ -215,8 +216,8 @@ impl<'a> Train<'a> {
         }
     }
 
-    /// The runs of shots that fit into `longest` seconds and into no more, one for each first shot of the
-    /// scan: the number of the first and that behind the last.
+    /// Returns the longest runs of shots that fit into `longest` seconds, one for each first shot of the
+    /// scan. A run is the number of its first shot and the number behind its last.
     fn runs(&self, longest: f64) -> impl Iterator<Item = [usize; 2]> {
         let mut end = 0;
         (0..self.shots).map(move |first| {
@@ -330,7 +331,7 @@ impl<'a> Train<'a> {
         let once = *self.sums.get(self.shots)?;
         let most = |longest: f64| ((longest - pass) / period * (1.0 + 1e-12)).floor() + 1.0;
         let mut tried: Vec<f64> = (1..40).map(|power| libm::exp2(f64::from(power))).collect();
-        // And as many as one exposure, one aperture or all that is judged can hold.
+        // And the most scans that one exposure, one aperture or all that is judged can hold.
         let ends = [LONGEST, self.durations[1].min(LAST)];
         tried.extend(ends.map(most));
         // From 10 s on a power is allowed, which the first exposure beyond uses up soonest.

@@ -1,9 +1,12 @@
 //! Eye safety: our reading of IEC 60825-1:2014, class 1, point source \[IEC60825\]. Not a
 //! certification. Every assumption is a parameter, or printed by [`ASSUMED`].
 //!
-//! Three steps: the [`Class1`] limits at a wavelength; the shots of one scan that cross the eye
-//! where most light does, as times and energies ([`Exposure`]); and what that leaves to a shot,
-//! [`limits`].
+//! It has three steps:
+//!
+//! 1. The [`Class1`] limits at a wavelength.
+//! 2. The times and energies of the shots of one scan that cross the eye where most light does
+//!    ([`Exposure`]).
+//! 3. The energy that the limits leave to a shot ([`limits`]).
 
 mod beams;
 mod class1;
@@ -22,7 +25,7 @@ pub use exposure::{
     Crossing, Crossings, Exposure, Limit, Rule, limits, strictest, strictest_of_each,
 };
 
-/// What the limits take for granted, for people to read.
+/// The assumptions of the limits, for people to read.
 pub const ASSUMED: &str = "IEC 60825-1:2014 class 1, point source, through the aperture at \
     safety.distance_mm (condition 3), or 2 m away through 50 mm or, above 1400 nm, seven times the \
     aperture (condition 1), where most light crosses it; every shot as bright as the brightest word of \

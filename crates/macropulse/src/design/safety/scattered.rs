@@ -139,8 +139,8 @@ impl Field for Scattered<'_> {
 mod tests {
     use crate::design::Design;
 
-    /// Known answer: where beams are sharp and the aperture holds all directions, a class 1 sensor
-    /// of scattered beams may send in a shot what one of a raster with as many shots may.
+    /// Known answer: if beams are sharp and the aperture holds all directions, class 1 allows a shot of
+    /// scattered beams the energy of a shot of a raster. Both have the same number of shots.
     #[test]
     fn scattered_beams_that_all_cross_the_eye_count_as_those_of_a_raster() {
         let energy = |scan: &str| {

@@ -19,14 +19,14 @@ pub(super) struct Share {
     radius: f64,
     /// Radius of the beam.
     beam: f64,
-    /// Where the table begins, and how far its places stand apart; none for a beam without width.
+    /// Start of the table, and the distance between its places; 0 for a beam without width.
     first: f64,
     step: f64,
     table: Vec<f64>,
 }
 
 impl Share {
-    /// Of a beam of radius `beam` through an aperture of radius `radius`, m.
+    /// Tabulates the share of a beam of radius `beam` through an aperture of radius `radius`, m.
     pub fn new(radius: f64, beam: f64) -> Self {
         if beam < 1e-6 * radius {
             return Self { radius, beam, first: 0.0, step: 0.0, table: Vec::new() };
@@ -63,7 +63,7 @@ impl Share {
         };
         let place = (distance - self.first) / self.step;
         if place <= 0.0 {
-            // Where the table does not begin in the middle, the beam passes whole.
+            // If the table does not begin in the middle, the beam passes whole before it.
             return if self.first > 0.0 { 1.0 } else { first };
         }
         let before = place as usize;

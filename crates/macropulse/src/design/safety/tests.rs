@@ -168,12 +168,12 @@ fn a_small_raster_by_plain_enumeration() {
     }
 }
 
-/// 13 lasers 1/3° apart lie within the 4.01° of the pupil, and 50 steps of 0.08°: with its corners
-/// cut off and columns closer below the horizon, about 480 shots in 2.2 ms. They may have
-/// 7e-4·(2.2 ms)^0.75·2.57 = 18 µJ together, 38 nJ each, and 6 % less without the thin ends of the circle, four
-/// fifths of the time with nine tenths of the shots. Lasers fire 1.39 µs apart, so 4 of them
-/// count as one. A step crosses with 10 lasers on average, in 2.8 such groups; in 50 steps and the 50
-/// scans of 10 s there are 7000, C5 is 0.547, and each shot may have 0.547 · 197.9 / 4 = 27 nJ.
+/// The 4.01° of the pupil hold 13 lasers 1/3° apart, and 50 steps of 0.08°. With its corners cut off and
+/// columns closer below the horizon, about 480 shots cross it in 2.2 ms. Together they may have
+/// 7e-4·(2.2 ms)^0.75·2.57 = 18 µJ, 38 nJ each. Without the thin ends of the circle it is 6 % less: nine
+/// tenths of the shots come in four fifths of the time. Lasers fire 1.39 µs apart, so 4 of them count as one.
+/// A step crosses with 10 lasers on average, in 2.8 such groups. In 50 steps and the 50 scans of 10 s there
+/// are 7000 groups. C5 is 0.547, and each shot may have 0.547 · 197.9 / 4 = 27 nJ.
 #[test]
 fn a_turning_head_with_32_lasers() {
     let lasers = "[{ lasers = 32, first_deg = 2.0, step_deg = -0.3333333333333333 }]";

@@ -1,17 +1,18 @@
-//! Where an eye gets most: the places of an aperture at which each rule allows least.
+//! The places of an aperture at which an eye gets most light: each rule allows least there.
 //!
 //! Each rule has a worst place of its own: the shots that count as one may come from two lasers, the mean
 //! power from all of them. The place is searched for in elevation and azimuth, and at each place every rule
 //! looks for its worst time.
 //!
 //! 1. Places are tried an eighth of the aperture apart, coarse steps first.
-//! 2. Where few beams cross at once, places that two of them share are tried as well: these may be too small for a grid.
+//! 2. If few beams cross at once, places that two of them share are tried as well: these may be too small for
+//!    a grid.
 //! 3. The best places of each rule are refined in steps that are halved.
 //! 4. From each of these, places nearby are tried that one more beam grazes: it brings next to no light, but counts as
 //!    an exposure, which C5 takes account of.
 //!
-//! What is found is the light at a real place, so the search can only miss light: it may allow more than the
-//! worst place there is. `brute.rs` holds it against a grid, to 2 %.
+//! The search finds the light at real places, so it can only miss light: it may allow more than the worst
+//! place there is. `brute.rs` holds it against a grid, to 2 %.
 
 use super::exposure::{Crossing, RULES};
 
@@ -28,7 +29,7 @@ const SIDES: [f64; 8] = [0.0, 1.0, 1.0, 1.0, 0.0, -1.0, -1.0, -1.0];
 /// Places that are tried in any case.
 const LEAST: usize = 3;
 
-/// Where the middle of an aperture is, rad.
+/// Direction of the middle of an aperture, rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Aim {
     pub azimuth: f64,
@@ -51,8 +52,9 @@ pub(super) trait Field {
     /// seconds count as one.
     fn starts(&self, gap: f64, counted: f64) -> Vec<Aim>;
 
-    /// Places that two beams cross. One of the two is of some beams spread evenly over the scan, the other is any. There is
-    /// no such place where so many beams cross an aperture that light hardly depends on the place.
+    /// Places that two beams cross. One of the two is from a selection spread evenly over the scan, the other
+    /// is any. There is no such place if an aperture holds many beams: light hardly depends on the place
+    /// then.
     fn shared(&self) -> Vec<Aim>;
 
     /// Places `gap` from `aim` at most that one more beam just crosses; none where many beams cross.
@@ -65,8 +67,8 @@ pub(super) trait Field {
     /// difference.
     fn pitch(&self, gap: f64) -> [f64; 2];
 
-    /// Shots that may be looked at. Where more cross, light hardly depends on the place, and fewer places
-    /// are tried.
+    /// Shots that may be looked at. With more of them at a place, light hardly depends on the place, and
+    /// fewer places are tried.
     fn effort(&self) -> usize;
 }
 
@@ -89,7 +91,8 @@ pub(super) fn worst(
     }
     let shared = coarse_first(&field.shared());
     if !shared.is_empty() {
-        // Where few beams cross, a place takes little time: these have an effort of their own, and so has what follows.
+        // A place that few beams cross takes little time: these have an effort of their own, and so has what
+        // follows.
         search.spent = 0;
         for aim in shared {
             if search.spent > field.effort() {
@@ -144,7 +147,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// What each rule allows at `aim`.
+    /// Tries `aim`. Returns the energy that each rule allows there.
     fn at(&mut self, aim: Aim) -> [f64; RULES] {
         let shots = self.field.crossing(aim);
         // A place where nothing crosses takes some time, too.

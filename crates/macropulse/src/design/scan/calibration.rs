@@ -1,19 +1,22 @@
-//! The lasers of a turning head from a calibration file: the metadata of an Ouster sensor (`.json`, see
-//! [`ouster`]), the angle corrections of a Hesai sensor (`.csv`, see [`hesai`]), or the list `lasers:` of the
-//! YAML files that drivers of Velodyne sensors read \[VelRos\].
+//! The lasers of a turning head from a calibration file. It is one of three kinds:
 //!
-//! Angles are in radians, lengths in metres. With R the distance a laser measures, d its
-//! `dist_correction`, φ the azimuth of the head, clockwise, and α, ε, h, v its `rot_correction`,
-//! `vert_correction`, `horiz_offset_correction` and `vert_offset_correction`, the driver has
+//! - The metadata of an Ouster sensor (`.json`, see [`ouster`]).
+//! - The angle corrections of a Hesai sensor (`.csv`, see [`hesai`]).
+//! - The list `lasers:` of the YAML files that drivers of Velodyne sensors read \[VelRos\].
+//!
+//! In the YAML files, angles are in radians and lengths in metres. R is the distance that a laser measures, φ
+//! the azimuth of the head, clockwise, and d the `dist_correction` of the laser. Its `rot_correction`,
+//! `vert_correction`, `horiz_offset_correction` and `vert_offset_correction` are α, ε, h and v. The driver
+//! has
 //!
 //! x = ((R + d)·cos ε − v·sin ε)·cos(φ − α) + h·sin(φ − α)
 //! y = −((R + d)·cos ε − v·sin ε)·sin(φ − α) + h·cos(φ − α)
 //! z = (R + d)·sin ε + v·cos ε
 //!
-//! which is a beam along azimuth α − φ and elevation ε that begins h to the left of the axis and v
-//! above it, square to the beam, and whose clock starts 2d/c too late. Lasers fire in the order of
-//! `laser_id`. Left out, and said so where they would matter: the second distance corrections for
-//! near targets, and what corrects intensities.
+//! This is a beam along azimuth α − φ and elevation ε, whose clock starts 2d/c too late. It begins h to the
+//! left of the axis and v above it, square to the beam. Lasers fire in the order of `laser_id`. Two things
+//! are left out, and said so where they would matter: the second distance corrections for near targets, and
+//! the corrections of intensities.
 
 use std::path::Path;
 
@@ -31,9 +34,9 @@ const MOST_BYTES: u64 = 1 << 20;
 /// The lasers of a calibration, in the order in which they fire, and what it says beside.
 pub(super) struct Calibration {
     pub lasers: Vec<Laser>,
-    /// What is left out of it.
+    /// Remarks on the parts of it that are left out.
     pub notes: Vec<String>,
-    /// Of the file.
+    /// Digest of the file.
     pub digest: String,
 }
 
@@ -89,7 +92,7 @@ pub(super) fn read(path: &Path) -> Result<Calibration, String> {
     Ok(calibration)
 }
 
-/// What is wrong with the YAML of a calibration.
+/// Returns the fault in the YAML of a calibration, in our words.
 fn in_words(error: &Yaml) -> String {
     match error {
         Yaml::AliasError { error, .. } => in_words(error),
@@ -201,7 +204,7 @@ impl LaserFile {
     }
 }
 
-/// What the calibration says that is not simulated, as a sentence.
+/// Returns the parts of the calibration that are not simulated, as a sentence.
 fn left_out(lasers: &[LaserFile], origin: &str) -> Option<String> {
     let set = |value: Option<f64>| value.is_some_and(|value| value != 0.0);
     let near = |laser: &LaserFile| {

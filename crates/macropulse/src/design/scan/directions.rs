@@ -1,21 +1,21 @@
-//! Where each shot is sent, looked up instead of computed for every one.
+//! The direction of each shot, looked up instead of computed for every one.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use macropulse_codec::ShotLog;
 
-/// Where the shots of a scan are sent: unit vectors in the sensor frame (x forward, y left, z up),
-/// and the places in it at which the beams begin.
+/// Directions of the shots of a scan, as unit vectors in the sensor frame (x forward, y left, z up), and the
+/// places in it at which the beams begin.
 ///
-/// Column 0 of a lattice is at the left, row 0 at the top. A spinning sensor begins to the rear,
-/// turns clockwise seen from above, and goes on turning while its lasers fire one after another.
-/// Where a pattern is no lattice the row is a laser and the column counts its shots.
+/// Column 0 of a lattice is at the left, row 0 at the top. A spinning sensor begins to the rear, turns
+/// clockwise seen from above, and goes on turning while its lasers fire one after another. If a pattern is no
+/// lattice, the row is a laser and the column counts its shots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Directions {
     course: Course,
-    /// Where the beam of each row begins, m, in a frame that has turned with its azimuth; empty where
-    /// all begin at the origin of the sensor.
+    /// The origin of the beam of each row, m, in a frame that has turned with its azimuth. Empty if all beams
+    /// begin at the origin of the sensor.
     origins: Vec<[f64; 3]>,
 }
 
@@ -45,11 +45,11 @@ pub struct Prism {
     pub deflection: f64,
     /// Turns per second, positive from the left to the top.
     pub turns_per_s: f64,
-    /// Where it deflects to at the beginning, rad from the left towards the top.
+    /// Direction of the deflection at the beginning, rad from the left towards the top.
     pub phase: f64,
 }
 
-/// What a path is.
+/// The source of the directions of a path.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Way {
     /// A list that begins anew at its end.
@@ -170,12 +170,12 @@ impl Directions {
         path.at(scan * per_scan + i64::from(column) * rows + i64::from(row))
     }
 
-    /// Whether beams begin elsewhere than at the origin of the sensor.
+    /// Returns true if beams begin elsewhere than at the origin of the sensor.
     pub fn have_origins(&self) -> bool {
         !self.origins.is_empty()
     }
 
-    /// Where in the sensor frame the beam to a pixel begins, m.
+    /// Returns the origin of the beam to a pixel in the sensor frame, m.
     #[inline]
     pub fn origin(&self, row: u16, column: u16) -> [f64; 3] {
         let (row, column) = (usize::from(row), usize::from(column));

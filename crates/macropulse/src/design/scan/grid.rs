@@ -43,7 +43,7 @@ impl Typed {
 }
 
 impl Grid {
-    /// Where the middles of its cells lie.
+    /// Returns the directions of the middles of its cells.
     pub(super) fn directions(&self) -> Directions {
         let azimuths = Angles::by_column(middles(self.horizontal, self.columns));
         Directions::new(&Angles::by_row(self.elevations()), &azimuths, Vec::new())

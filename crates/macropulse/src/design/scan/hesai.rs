@@ -1,5 +1,5 @@
-//! The lasers of a turning head from the angle correction file of a Hesai sensor: a table of text with a line
-//! for each laser, its number from 1, its elevation and its azimuth, degrees \[Nebula\].
+//! The lasers of a turning head from the angle correction file of a Hesai sensor. The file is a table of text
+//! with a line for each laser: its number from 1, its elevation and its azimuth, degrees \[Nebula\].
 //!
 //! With φ the azimuth of the head, clockwise from y, and α and ε the angles of a line, the driver has
 //!

@@ -15,7 +15,7 @@ pub struct Laser {
     pub azimuth: f64,
     /// Added to what it measures, m.
     pub range_offset: f64,
-    /// Where its beam begins, m: forward along its azimuth, left, up.
+    /// Origin of its beam, m: forward along its azimuth, left, up.
     pub origin: [f64; 3],
 }
 
@@ -30,11 +30,11 @@ pub(super) struct File {
     #[serde(default)]
     #[schemars(range(min = -180, max = 180))]
     azimuth_deg: f64,
-    /// What is added to the range it measures, mm, because its clock starts too late by it.
+    /// Offset added to the range that it measures, mm, because its clock starts too late by it.
     #[serde(default)]
     #[schemars(range(min = -10000, max = 10000))]
     range_offset_mm: f64,
-    /// Where the beam begins, mm: forward along its azimuth, left, up.
+    /// Origin of the beam, mm: forward along its azimuth, left, up.
     #[serde(default)]
     #[schemars(inner(range(min = -1000, max = 1000)))]
     origin_mm: [f64; 3],
@@ -42,7 +42,7 @@ pub(super) struct File {
 
 /// A limit of a laser, in SI units.
 pub(super) struct Limit {
-    /// What the number is.
+    /// Name of the number.
     pub what: &'static str,
     /// Its largest absolute value.
     pub most: f64,
@@ -50,11 +50,11 @@ pub(super) struct Limit {
 
 /// The limits of what a laser is, the same for a sensor file and for a calibration.
 pub(super) const ELEVATION: Limit = Limit { what: "elevation", most: 90.0 };
-/// Of the azimuth, degrees.
+/// The limit of the azimuth, degrees.
 pub(super) const AZIMUTH: Limit = Limit { what: "azimuth", most: 180.0 };
-/// Of the range offset, m.
+/// The limit of the range offset, m.
 pub(super) const RANGE_OFFSET: Limit = Limit { what: "range offset", most: 10.0 };
-/// Of each coordinate of the origin, m.
+/// The limit of each coordinate of the origin, m.
 pub(super) const ORIGIN: Limit = Limit { what: "origin", most: 1.0 };
 
 /// Lasers of the largest head.

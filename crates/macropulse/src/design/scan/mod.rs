@@ -1,4 +1,4 @@
-//! Where and when the sensor looks: `[scan]`, and a scan pattern in it.
+//! The directions and the times at which the sensor looks: `[scan]`, and a scan pattern in it.
 //!
 //! Each pattern is one file: its keys and their limits (`Typed`), and its answers to what the
 //! workbench asks of every pattern (`Model`). A new one is such a file and an entry in the list of
@@ -52,7 +52,7 @@ macro_rules! patterns {
             /// Names of all patterns: each is a table `[scan.NAME]` of a sensor file.
             pub const NAMES: &[&str] = &[$($name),+];
 
-            /// What it answers.
+            /// Returns the model of the pattern.
             pub(crate) fn model(&self) -> &dyn Model {
                 match self {
                     $(Self::$Kind(pattern) => pattern,)+
@@ -60,7 +60,7 @@ macro_rules! patterns {
             }
         }
 
-        /// `[scan]` as typed: its own keys, and a table for each pattern, of which it has one.
+        /// `[scan]` as typed: its own keys, and a table for each pattern. A file has one of these tables.
         #[derive(Debug, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub(super) struct ScanFile {
@@ -76,8 +76,8 @@ macro_rules! patterns {
             /// How far the range gate goes on behind `max_range_m`, m.
             #[schemars(range(min = 0, max = 1e5))]
             gate_beyond_m: f64,
-            /// Range to which the light of a shot is followed, m; twice the end of the range gate
-            /// unless it is given. What comes from beyond the gate falls into that of a later shot.
+            /// Range to which the light of a shot is followed, m; twice the end of the range gate unless it
+            /// is given. Light from beyond the gate falls into that of a later shot.
             #[schemars(range(max = 1e5))]
             light_range_m: Option<f64>,
             $($(#[$doc])* #[serde(rename = $name)] $file: Option<$file::File>,)+
@@ -125,7 +125,7 @@ trait Typed {
     }
 }
 
-/// Where and when the sensor looks.
+/// The directions and the times at which the sensor looks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
     /// Rows of the range image.
@@ -143,14 +143,14 @@ pub struct Scan {
     /// Range to which the light of a shot is followed, m: beyond the gate, because what returns
     /// from there arrives in the gates of later shots.
     pub light_range: f64,
-    /// Whether the mirror moves on during a macropulse.
+    /// True if the mirror moves on during a macropulse.
     pub moves: bool,
     /// How directions follow each other.
     pub pattern: Pattern,
 }
 
 impl Scan {
-    /// What its pattern is, in a few words for people.
+    /// Returns a description of its pattern in a few words, for people.
     pub fn summary(&self) -> String {
         self.model().summary()
     }
@@ -165,7 +165,7 @@ impl Scan {
         }
     }
 
-    /// What its pattern answers.
+    /// Returns the model of its pattern.
     pub(crate) fn model(&self) -> &dyn Model {
         self.pattern.model()
     }
@@ -197,14 +197,14 @@ impl Scan {
         self.model().shortest_dwell(self.period() / self.shots() as f64)
     }
 
-    /// Whether all shots of a scan are fired at one moment.
+    /// Returns true if all shots of a scan are fired at one moment.
     pub fn is_one_flash(&self) -> bool {
         let moment = |order| self.model().moment(order, self.period());
         moment(0) == moment(self.shots() - 1)
     }
 
-    /// Whether rows and columns are an image of the field, the same in every scan. Where they are none
-    /// a row is a laser and the column counts its shots.
+    /// Returns true if rows and columns are an image of the field, the same in every scan. Otherwise a row is
+    /// a laser and the column counts its shots.
     pub fn has_image(&self) -> bool {
         self.model().is_lattice()
     }
@@ -274,9 +274,9 @@ impl Gates<'_> {
 /// Pixels of the largest range image: a scan of it takes some 4 GB.
 const MOST_PIXELS: u64 = 1 << 25;
 
-/// Light is followed to so many times the end of the range gate, unless the file says how far: to
-/// all second-time-around returns that fall into the gate of the shot fired one gate later. From
-/// twice the range a surface brings a quarter of the light at most.
+/// Light is followed to this multiple of the end of the range gate, unless the file says how far. This covers
+/// all second-time-around returns that fall into the gate of the shot fired one gate later. From twice the
+/// range a surface brings a quarter of the light at most.
 const LIGHT_BEYOND_GATE: f64 = 2.0;
 
 impl Check<'_> {

@@ -95,9 +95,9 @@ pub(crate) trait Model {
 /// When a shot is fired, from the beginning of its scan: exact, and a rest that is not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Moment {
-    /// So many mean times between shots have passed.
+    /// Mean times between shots that have passed.
     pub shots: u64,
-    /// And this time more, s.
+    /// Time that has passed in addition, s.
     pub then: f64,
 }
 

@@ -1,8 +1,8 @@
 //! The lasers of a turning head from the metadata of an Ouster sensor: JSON with a list of
 //! `beam_altitude_angles` and one of `beam_azimuth_angles`, \[OusSdk\].
 //!
-//! With R the distance a laser measures, n `lidar_origin_to_beam_origin_mm`, α and ε an azimuth and an
-//! altitude of the lists and θ the azimuth of the head, counterclockwise, the maker has
+//! R is the distance that a laser measures, n is `lidar_origin_to_beam_origin_mm`, and θ is the azimuth of
+//! the head, counterclockwise. An azimuth and an altitude of the lists are α and ε. The maker has
 //!
 //! x = (R − n)·cos(θ − α)·cos ε + n·cos θ
 //! y = (R − n)·sin(θ − α)·cos ε + n·sin θ

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 /// A prism whose sides, its facets, are mirrors.
 ///
 /// The light comes and goes in a plane with the axle and is led out of its way by twice the angle by which
-/// the polygon turns. It is as wide as the receiver's aperture, and a facet must hold all of it as long as
-/// shots are fired: the rest of a facet's turn is lost to a line.
+/// the polygon turns. It is as wide as the receiver's aperture. A facet must hold all of it for the time in
+/// which shots are fired; the rest of a facet's turn is lost to a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Polygon {
     /// Mirrors around the axle.
@@ -26,8 +26,8 @@ impl Polygon {
         self.diameter * libm::sin(PI / f64::from(self.facets))
     }
 
-    /// The widest light, m, of which nothing passes beside the facet at both ends of a line that covers
-    /// `horizontal` radians: D·sin(π/n − φ/4).
+    /// Returns the width, m, of the widest light that meets the facet entirely, at both ends of a line that
+    /// covers `horizontal` radians: D·sin(π/n − φ/4).
     ///
     /// At the ends the polygon is turned by θ = φ/4. Light towards the axle meets the facet, whose middle is
     /// r = D/2·cos(π/n) from the axle, at r·tan θ from that middle, and is 1/cos θ as wide there. With half
@@ -45,12 +45,12 @@ impl Polygon {
         libm::sin(PI / f64::from(self.facets) - horizontal / 4.0)
     }
 
-    /// Turns a second that draw so many `lines` a second.
+    /// Returns the turns per second that draw `lines` a second.
     pub fn turns(&self, lines: f64) -> f64 {
         lines / f64::from(self.facets)
     }
 
-    /// Speed of its corners, m/s, at so many `lines` a second.
+    /// Returns the speed of its corners, m/s, at `lines` a second.
     pub fn tip_speed(&self, lines: f64) -> f64 {
         PI * self.diameter * self.turns(lines)
     }

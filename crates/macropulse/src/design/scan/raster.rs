@@ -19,8 +19,8 @@ use crate::design::safety::{Beams, Line, Lines};
 pub struct Raster {
     /// Its pixels: a line of a beam is a row.
     pub grid: Grid,
-    /// Beams that fire at the same moments. The first draws the uppermost rows, as many as each of the
-    /// others, from the top down.
+    /// Beams that fire at the same moments, with the same number of rows each. The first draws the uppermost
+    /// rows, from the top down.
     pub beams: u32,
     /// Motion of the fast axis.
     pub mirror: Mirror,
@@ -71,8 +71,8 @@ pub(super) struct File {
     /// Full field from top to bottom, degrees.
     #[schemars(range(min = 0.001, max = 180))]
     vertical_deg: f64,
-    /// Beams side by side, which fire at the same moments: each draws as many rows, one below the other, and
-    /// has a detector and converters of its own.
+    /// Beams side by side, which fire at the same moments. Each draws the same number of rows, one below the
+    /// other, and has a detector and converters of its own.
     #[schemars(range(min = 1, max = 1024))]
     beams: u32,
     /// Motion of the fast axis.
@@ -173,7 +173,7 @@ impl Raster {
         [order / (columns * beams), order / beams % columns, order % beams]
     }
 
-    /// Whether the line of this number is drawn from the right to the left.
+    /// Returns true if the line of this number is drawn from the right to the left.
     fn comes_back(&self, line: u64) -> bool {
         self.is_resonant() && line % 2 == 1
     }
@@ -182,7 +182,7 @@ impl Raster {
         self.mirror == Mirror::Sinusoidal
     }
 
-    /// Whether shots follow each other at equal times, from line to line too.
+    /// Returns true if shots follow each other at equal times, from line to line too.
     fn never_pauses(&self) -> bool {
         !self.is_resonant() && self.duty == 1.0
     }

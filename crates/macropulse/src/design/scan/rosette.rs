@@ -44,7 +44,7 @@ struct PrismFile {
     /// Turns per second, positive from the left to the top.
     #[schemars(range(min = -1e5, max = 1e5))]
     turns_per_s: f64,
-    /// Where it stands when the first scan begins, degrees from the left.
+    /// Direction of its deflection when the first scan begins, degrees from the left.
     #[serde(default)]
     #[schemars(range(min = -360, max = 360))]
     phase_deg: f64,

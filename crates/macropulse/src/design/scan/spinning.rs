@@ -25,7 +25,7 @@ pub struct Spinning {
     range_offsets: Vec<f64>,
     /// Columns of the image: azimuth steps of a turn.
     pub columns: u32,
-    /// Azimuth steps in a whole turn, of which a part may be left at its end.
+    /// Azimuth steps in a whole turn. It is no whole number if a part of a step is left at the end of a turn.
     steps: f64,
     /// Rows in the order in which they fire.
     order: Vec<u16>,
@@ -53,7 +53,7 @@ pub enum Firing {
 /// How long an azimuth step and what is in it take, where that is typed, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Pace {
-    /// An azimuth step: so many as fit into a turn.
+    /// An azimuth step. It determines the number of steps in a turn.
     cycle: Option<f64>,
     /// From one laser to the next, with a pause behind the last.
     firing: Option<f64>,
@@ -74,8 +74,9 @@ pub(super) struct File {
     /// Lasers one by one, in the order in which they fire; or `blocks`, or `calibration`.
     #[schemars(length(min = 1, max = 1024))]
     lasers: Option<Vec<laser::File>>,
-    /// Calibration file of the ROS driver of Velodyne sensors (YAML), metadata of an Ouster sensor (JSON),
-    /// or angle corrections of a Hesai sensor (CSV), beside this file; or `blocks`, or `lasers`.
+    /// Calibration file, beside this file; or `blocks`, or `lasers`. It is that of the ROS driver of Velodyne
+    /// sensors (YAML), the metadata of an Ouster sensor (JSON), or the angle corrections of a Hesai sensor
+    /// (CSV).
     calibration: Option<String>,
     /// Order within one column.
     firing: Firing,
@@ -167,7 +168,7 @@ impl File {
                 let turn = period * 1e6;
                 let path = "scan.spinning.cycle_us";
                 let cycle = check.within(path, typed, turn / 30_000.0, turn / 4.0)?;
-                // Of a turn that holds a whole number of them, rounding takes none away.
+                // If a turn holds a whole number of them, rounding must take none away.
                 let steps = turn / cycle;
                 let whole = steps.round();
                 let steps = if (steps - whole).abs() < 1e-6 { whole } else { steps };
@@ -250,7 +251,8 @@ impl Spinning {
         }
     }
 
-    /// Azimuth of the head, rad, when it has turned by so many azimuth steps: it begins to the rear.
+    /// Returns the azimuth of the head, rad, when it has turned by `column` + `turned` azimuth steps. It
+    /// begins to the rear.
     fn azimuth(&self, column: u32, turned: f64) -> f64 {
         PI - TAU * ((f64::from(column) + turned) / self.steps)
     }
@@ -372,7 +374,7 @@ impl Model for Spinning {
         let off = azimuth - self.lasers[usize::from(row)].azimuth;
         let turned = (PI - off) / TAU * self.steps - self.turned(row.into());
         let column = turned.rem_euclid(self.steps).round() as u16;
-        // Of the part of a step that is left at the end of a turn the first column is nearest.
+        // The first column is nearest to the part of a step that is left at the end of a turn.
         Some((row, if u32::from(column) < self.columns { column } else { 0 }))
     }
 

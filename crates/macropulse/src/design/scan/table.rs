@@ -36,7 +36,7 @@ pub struct Table {
     pub lines: u32,
     /// Shots of each line in a scan.
     pub shots: u32,
-    /// Whether the lines fire together.
+    /// True if the lines fire together.
     pub together: bool,
     digest: String,
     notes: Vec<String>,
@@ -57,7 +57,7 @@ pub(super) struct File {
     firings_per_s: Option<f64>,
 }
 
-/// What a table says: directions, and times if it has them, s.
+/// The entries of a table: directions, and times if it has them, s.
 struct Entries {
     directions: Vec<[f64; 3]>,
     times: Vec<f64>,
@@ -125,7 +125,7 @@ impl Typed for File {
     }
 }
 
-/// The bytes of the file at `path`, of which there may be so many at most.
+/// Reads the bytes of the file at `path`, `most` of them at most.
 pub(super) fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, String> {
     let unread = |error: std::io::Error| {
         format!("{}: cannot be read: {}", path.display(), told::unreadable(&error))
@@ -146,7 +146,7 @@ enum Column {
     Other,
 }
 
-/// What the header of a column says: a name, and behind `/`, `_`, a space or a bracket its unit.
+/// Reads the header of a column: a name, and behind `/`, `_`, a space or a bracket its unit.
 fn column(header: &str) -> Result<Column, String> {
     let lower = header.trim().trim_start_matches('\u{feff}').to_ascii_lowercase();
     let mut words = lower.split(|letter: char| !letter.is_alphanumeric()).filter(|w| !w.is_empty());
@@ -247,7 +247,7 @@ fn entries(bytes: &[u8], origin: &str) -> Result<Entries, String> {
     Ok(found)
 }
 
-/// Whether the times are whole seconds that only count the entries, or the groups of lines.
+/// Returns true if the times are whole seconds that only count the entries, or the groups of lines.
 fn only_count(times: &[f64], lines: usize) -> bool {
     let counts = |group: usize| {
         let expected = |at: usize| times[0] + (at / group) as f64;
@@ -389,8 +389,8 @@ impl Model for Table {
     }
 }
 
-/// The cell of a shot among `shots` of so many lines: as wide and as high as the median step from one
-/// shot of a line to the next.
+/// Returns the cell of a shot among `shots` of `lines` lines. It is as wide and as high as the median step
+/// from one shot of a line to the next.
 pub(super) fn cell(shots: &[[f64; 3]], lines: usize) -> [f64; 2] {
     let step = |pair: &[[f64; 3]]| {
         let [one, next] = [pair[0], pair[lines]];

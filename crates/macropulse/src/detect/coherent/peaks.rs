@@ -46,9 +46,10 @@ impl Bins {
 
     /// How far from the middle of bin number `at` of these the beat is, −½ to ½.
     ///
-    /// The spectrum between the bins is X(u) = Σ X_j·sinc(u − j) = sin(πu)/π·Σ (−1)ʲ·X_j/(u − j), of as many bins as are
-    /// near. Behind a window nothing is missing of it, and the beat is where it is highest. Without one the fields of
-    /// a beat at u are sinc(u − j), and the most likely u has the highest |X(u)|²/Σ sinc²(u − j).
+    /// The spectrum between the bins is X(u) = Σ X_j·sinc(u − j) = sin(πu)/π·Σ (−1)ʲ·X_j/(u − j), summed over
+    /// the near bins. Behind a window nothing is missing of it, and the beat is where it is highest. Without
+    /// one the fields of a beat at u are sinc(u − j), and the most likely u has the highest
+    /// |X(u)|²/Σ sinc²(u − j).
     fn aside(&self, at: usize) -> f64 {
         let from = at.saturating_sub(NEAR as usize);
         let to = (at + NEAR as usize + 1).min(self.fields.len());

@@ -1,10 +1,12 @@
 //! Spectra bin by bin.
 //!
-//! Without a window the bins of a ramp are independent: the leaked fields of all tones, and a complex normal variable of
-//! noise. Bins near a tone are drawn. Of the others those are drawn that exceed the least power of a peak: their number
-//! is a binomial variable, and noise in so many normal variables has an exponential power beyond any. The window is a sum of
-//! bins, a weight vector w of length 1; what is around a bin of the field Y is what would be there without, moved along w
-//! until it sums to Y.
+//! Without a window the bins of a ramp are independent: the leaked fields of all tones, and a complex normal
+//! variable of noise. Bins near a tone are drawn. The others count as noise alone, and only those are drawn
+//! that exceed the least power of a peak. Their number is a binomial variable. The power of complex normal
+//! noise is exponential, and so is its excess over any power.
+//!
+//! The window makes each bin a sum of bins, with a weight vector w of length 1. If a bin has the field Y
+//! behind the window, the bins around it are those without this condition, moved along w until they sum to Y.
 
 use macropulse_codec::Peak;
 use macropulse_codec::decode::beat::{SpectralWindow, sinc};

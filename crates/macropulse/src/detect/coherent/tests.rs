@@ -53,9 +53,10 @@ fn moments(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt())
 }
 
-/// H0: beats are measured to σ = √6/(2π)·(c/2B)/√S, and to 1.530 times that behind a Hann window, S the power over noise in
-/// each ramp; whichever way spectra are made, and however long a ramp is. N = 3000, seed 11; within 6 % (a standard deviation of
-/// 3000 values has 1.3 %). Control: twice the bandwidth is noticed.
+/// H0: beats are measured to σ = √6/(2π)·(c/2B)/√S, and to 1.530 times that behind a Hann window. S is the
+/// power over noise in each ramp. This holds for both ways to make spectra, and for any length of a ramp.
+/// N = 3000, seed 11; within 6 % (a standard deviation of 3000 values has 1.3 %). Control: twice the
+/// bandwidth is noticed.
 #[test]
 fn beats_are_as_precise_as_the_bound() {
     for (window, loss) in [("\"none\"", 1.0), ("\"hann\"", 1.530)] {
@@ -102,9 +103,9 @@ fn kolmogorov(one: &[f64], other: &[f64]) -> f64 {
     apart.fold(0.0, f64::max) * (one.len() as f64 / 2.0).sqrt()
 }
 
-/// H0: drawn bin by bin and sample by sample, the powers of the strongest peaks, their places and how many peaks there
-/// are have the same distributions: of a faint surface, and of a bright one before a faint one. N = 4000, seed 11,
-/// α = 1e-6 each. Control: a tenth less light is noticed.
+/// H0: drawn bin by bin and sample by sample, the strongest peaks have the same powers and places, and the
+/// same number of peaks is found, in distribution. One of the surfaces is faint, with a bright one behind it.
+/// N = 4000, seed 11, α = 1e-6 each. Control: a quarter less light is noticed.
 #[test]
 fn both_ways_to_make_spectra_agree_in_distribution() {
     for window in ["\"none\"", "\"hann\""] {
@@ -149,9 +150,9 @@ fn both_ways_to_make_spectra_agree_in_distribution() {
     }
 }
 
-/// Published: a line of 100 kHz leaves 0.574 of the peak at 150 m in 10 µs, 0.495 at 200 m, and of 1 MHz 0.033; the
-/// simulation of the first, N = 3000, seed 11, within 3 %, where one standard deviation of the mean is 1 %. Control: half the
-/// line is noticed.
+/// Published: a line of 100 kHz leaves 0.574 of the peak at 150 m in 10 µs, 0.495 at 200 m, and of 1 MHz
+/// 0.033. The simulation of the first agrees within 3 %, where one standard deviation of the mean is 1 %.
+/// N = 3000, seed 11. Control: half the line is noticed.
 #[test]
 fn a_broad_line_leaves_less_of_a_peak() {
     let with = |khz: &str| {

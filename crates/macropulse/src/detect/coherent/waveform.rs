@@ -1,8 +1,9 @@
 //! Spectra sample by sample: for chirps that are not ideal.
 //!
-//! Sample n of a ramp with N of them is, for each tone of b bins and the field a, a/√N·exp(2πi·b·(n − (N − 1)/2)/N), turned
-//! by the phase of the laser now less that of the laser when the light left; and noise. The phase of the laser wanders with
-//! the variance 2π·Δν per second, Δν the width of its line, and strays with its chirp.
+//! Sample n of a ramp with N of them is a sum over the tones, and noise. A tone of b bins and the field a
+//! adds a/√N·exp(2πi·b·(n − (N − 1)/2)/N). It is turned by the phase of the laser now less that of the laser
+//! when the light left. The phase of the laser wanders with the variance 2π·Δν per second, Δν the width of
+//! its line, and strays with its chirp.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -133,8 +134,8 @@ impl Waveforms {
     }
 }
 
-/// Adds a tone to `samples`, which begins with `field` and is turned by `step` from sample to sample, and by the phases
-/// that the light of the laser had when it left, against their `sense`.
+/// Adds a tone to `samples`. The tone begins with `field` and is turned by `step` from sample to sample. It
+/// is also turned, against their `sense`, by the phases that the light of the laser had when it `left`.
 fn add(
     samples: &mut [Complex64],
     (field, step): (Complex64, Complex64),

@@ -1,10 +1,12 @@
 //! How many counts each bin of a histogram has.
 //!
-//! SPAD cells of a pixel share its light evenly. Where a cell counts without dead time, the counts of a bin
-//! are a Poisson variable. Where it counts once a cycle, a cell that has not yet counted does so in bin i with
-//! probability 1 − exp(−λᵢ/N), λᵢ the mean detections of all N cells: bin by bin this is a binomial variable of
-//! the cells that are left, together one multinomial. With a dead time, afterpulses or crosstalk the cells are
-//! followed from count to count.
+//! SPAD cells of a pixel share its light evenly. There are three cases:
+//!
+//! - If cells count without dead time, the counts of a bin are a Poisson variable.
+//! - If they count once a cycle, a cell that has not yet counted does so in bin i with probability
+//!   1 − exp(−λᵢ/N). Here λᵢ is the mean detections of all N cells. Bin by bin this is a binomial variable of
+//!   the cells that are left; together it is one multinomial.
+//! - With a dead time, afterpulses or crosstalk the cells are followed from count to count.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -61,7 +63,7 @@ impl Cells {
         FLOOD * counts * f64::from(self.number)
     }
 
-    /// Whether what a cell does depends on earlier cycles or on other cells.
+    /// Returns true if a cell depends on earlier cycles or on other cells.
     fn have_state(&self) -> bool {
         let is_blind = self.dead_fs > 0 && self.arming == Arming::FreeRunning;
         is_blind || self.afterpulse.0 > 0.0 || self.crosstalk > 0.0
@@ -231,7 +233,7 @@ fn independent(
         let mean = cycles * rates[first];
         let counts = &mut counts[first..first + bins];
         if bins >= LONG && mean < 1.0 {
-            // As many places as counts, each in a bin of its own choice.
+            // The total is drawn first; each count then chooses a bin at random.
             let total = poisson(mean * bins as f64, stream);
             for _ in 0..total {
                 counts[stream.random_range(0..bins)] += 1;
@@ -251,7 +253,7 @@ fn poisson(mean: f64, stream: &mut Stream) -> u64 {
     })
 }
 
-/// First counts of so many `trials`, cells in cycles, each of which gets this `share` of the light.
+/// Adds the first counts of `trials`, cells in cycles. Each of them gets this `share` of the light.
 fn first_of_each(
     (trials, share): (u64, f64),
     (rates, steady): (&[f64], f64),

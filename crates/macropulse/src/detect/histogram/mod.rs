@@ -54,7 +54,7 @@ struct Pulses<'a> {
 /// The shape of a pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Shape<'a> {
-    /// Of this rms length, light and timing together, fs.
+    /// A Gaussian of this rms length, light and timing together, fs.
     Gaussian(f64),
     /// As it was measured.
     Measured(&'a Kernel),
@@ -133,7 +133,8 @@ impl Accumulator {
         let all = i64::from(self.burst.pulses);
         let spilled = found.clone();
         for pulse in spilled {
-            // What reaches over the end of a cycle lies in the next one, and the other way round.
+            // A pulse that reaches over the end of a cycle lies in the next one, too, and one that reaches
+            // over its beginning in the one before.
             let (middle, [before, behind]) = (pulse.middle_fs, self.reach(pulse.shape));
             for (cycles_on, over) in [(1, middle + behind > interval as f64), (-1, middle < before)]
             {

@@ -1,9 +1,9 @@
 //! MCAP: all scans of a run in one file of messages, which fill up scan by scan.
 //!
-//! A scan is flushed as a chunk of its own when it is done, and the summary follows at the end. So
-//! the file cannot appear as a whole, as our others do: it grows under its own name, and a run that
-//! is broken off leaves the finished scans in it. Readers that go through a file from its beginning
-//! read those, and `mcap recover` adds the summary.
+//! A scan is flushed as a chunk of its own when it is done, and the summary follows at the end. So the file
+//! cannot appear as a whole, as our others do: it grows under its own name. A run that is broken off leaves
+//! the finished scans in it. Readers that go through a file from its beginning read those, and `mcap recover`
+//! adds the summary.
 
 mod cdr;
 mod foxglove;
@@ -36,7 +36,7 @@ pub(super) const EPOCH_NS: u64 = 1_000_000_000;
 const METADATA: &str = "macropulse";
 const ABOUT: &str = "about";
 
-/// What the messages of a file are.
+/// Type of the messages of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Message {
     /// ROS 2: `sensor_msgs/msg/PointCloud2`, `/tf` and `/tf_static`.
@@ -89,7 +89,7 @@ impl Message {
         (self == Self::Osi).then(osi::file_metadata)
     }
 
-    /// What a scan becomes; the first one also brings what is said once.
+    /// Encodes a scan; the first scan also brings the contents that a file has once.
     fn payloads(self, cloud: &PointCloud, is_first: bool) -> io::Result<Vec<Payload>> {
         match self {
             Self::Ros2(profile) => ros2::payloads(profile, cloud, is_first),
@@ -233,8 +233,8 @@ fn cause(error: McapError) -> io::Error {
     }
 }
 
-/// When the first shot of a scan was fired, ns from the beginning of the first scan: that of a pixel
-/// where there are any, or else that of a return.
+/// Time of the first shot of a scan, ns from the beginning of the first scan. It is the earliest time of a
+/// pixel, or of a return if the cloud has no pixels.
 fn begins_ns(cloud: &PointCloud) -> f64 {
     let times = if cloud.fired_ns.is_empty() { &cloud.time_ns } else { &cloud.fired_ns };
     let first = times.iter().copied().filter(|time| !time.is_nan()).fold(f64::INFINITY, f64::min);

@@ -156,7 +156,7 @@ const QUALIFIERS: &[&str] = &[
     "DATA_QUALIFIER_INVALID",
 ];
 
-/// Of [`QUALIFIERS`], that the sensor works.
+/// Index in [`QUALIFIERS`] of a sensor that works.
 const AVAILABLE: i32 = 2;
 
 const CLASSIFICATIONS: &[&str] = &[
@@ -168,7 +168,7 @@ const CLASSIFICATIONS: &[&str] = &[
     "DETECTION_CLASSIFICATION_UNDERDRIVABLE",
 ];
 
-/// Of [`CLASSIFICATIONS`], a surface; one at a wrong range; and nothing but noise.
+/// Indices in [`CLASSIFICATIONS`]: a surface, a surface at a wrong range, and nothing but noise.
 const SURFACE: i32 = 1;
 const INVALID: i32 = 2;
 const CLUTTER: i32 = 3;
@@ -269,7 +269,7 @@ pub(super) fn topics() -> Vec<Topic> {
     [("SensorData", "osi3.SensorData"), ("SensorView", "osi3.SensorView")].map(topic).into()
 }
 
-/// What a trace of OSI says of itself.
+/// The metadata that describes a trace of OSI.
 pub(super) fn file_metadata() -> Metadata {
     let entries = [
         ("version", VERSION_TEXT),
@@ -343,7 +343,7 @@ fn detection(cloud: &PointCloud, at: usize) -> LidarDetection {
     }
 }
 
-/// What consumers of detections are to take a return for.
+/// Index in [`CLASSIFICATIONS`] of a return with this outcome.
 fn classification(outcome: &Outcome) -> i32 {
     match outcome {
         Outcome::Right | Outcome::Near | Outcome::Edge => SURFACE,
@@ -357,7 +357,7 @@ fn object_id(object: u16) -> Option<Identifier> {
     identifier(if object == NO_OBJECT { u64::MAX } else { object.into() })
 }
 
-/// Of each return the surface it came from.
+/// Lists the surface of each return that came from one.
 fn reflections(cloud: &PointCloud) -> Vec<Reflection> {
     let truth = &cloud.truth.returns;
     let surfaces = truth.range.iter().zip(&truth.object).filter(|(range, _)| range.is_finite());

@@ -16,8 +16,8 @@ use std::io;
 /// The frame that points are in.
 pub(super) const SENSOR_FRAME: &str = "lidar";
 
-/// A scan as a message: organised, with NaN where there is no return, where each shot has one return
-/// at most and the driver of the profile does the same; else a list.
+/// Encodes a scan as a message. It is an image, with NaN for pixels without a return, if each shot has one
+/// return at most and the driver of the profile writes images. Otherwise it is a list.
 pub(super) fn encode(profile: Profile, cloud: &PointCloud) -> io::Result<Vec<u8>> {
     let stamp = stamp_ns(cloud);
     let source = Source::new(cloud, stamp as f64 - times_from_ns(cloud) as f64);
@@ -138,15 +138,15 @@ pub(super) fn decode(message: &[u8], about: &mut About) -> Result<PointCloud, St
     Ok(cloud)
 }
 
-/// Whether the fields are those that the driver of Velodyne writes, whose ring 0 is the lowest laser.
+/// Returns true if the fields are those of the Velodyne driver, whose ring 0 is the lowest laser.
 fn is_of_velodyne(fields: &[Stored]) -> bool {
     let known = ["x", "y", "z", "intensity", "ring", "time"];
     let has_ring = fields.iter().any(|field| field.name == "ring");
     has_ring && fields.iter().all(|field| known.contains(&field.name))
 }
 
-/// The lasers of the sensor of a list: what is told of it, or as many as the smallest head has that
-/// has all rings of the cloud.
+/// Number of lasers of the sensor of a list: the number that the file states, or that of the smallest head
+/// with all rings of the cloud.
 fn lasers(about: &About, cloud: &PointCloud) -> usize {
     let rings = cloud.row.iter().max().map_or(0, |ring| usize::from(*ring) + 1);
     let of_heads = || [16, 32, 64, 128].into_iter().find(|lasers| *lasers >= rings);
@@ -154,8 +154,8 @@ fn lasers(about: &About, cloud: &PointCloud) -> usize {
     told.or_else(of_heads).unwrap_or(rings)
 }
 
-/// The points of an image of the driver of Velodyne row by row from the top: it has a line for each
-/// column, of which point k is that of ring k. `None` for any other image.
+/// Returns the points of an image of the Velodyne driver row by row from the top. The image has a line for
+/// each column, and point k of a line is that of ring k. `None` for any other image.
 fn by_column(
     fields: &[Stored],
     body: &[u8],
@@ -182,7 +182,7 @@ fn by_column(
     Some(by_rows)
 }
 
-/// Where our attributes are, and what is to be added to their times, ns.
+/// Places of our attributes, and the offset to add to their times, ns.
 fn layout(fields: &[Stored], stride: usize, stamp_ns: f64) -> (Layout, f64) {
     let has = |name: &str| fields.iter().any(|field| field.name == name);
     let white = match () {

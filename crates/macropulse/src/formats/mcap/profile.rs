@@ -14,7 +14,7 @@ pub(super) struct Field {
     pub quantity: Quantity,
 }
 
-/// What a field holds.
+/// Content of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Quantity {
     /// An attribute as it is.
@@ -149,13 +149,13 @@ pub(in super::super) fn holding(profile: Profile, attribute: Attribute) -> Holdi
 }
 
 impl Profile {
-    /// Whether the image of its driver has a line for each column, which holds the lasers from the
-    /// lowest one up.
+    /// Returns true if the image of its driver has a line for each column, with the lasers from the lowest
+    /// one up.
     pub(super) fn is_by_column(self) -> bool {
         self == Self::Velodyne
     }
 
-    /// Whether its driver gives images, with a point for each pixel.
+    /// Returns true if its driver writes images, with a point for each pixel.
     pub(in super::super) fn is_organised(self) -> bool {
         !matches!(self, Self::Livox | Self::Autoware)
     }
@@ -274,8 +274,10 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Autoware's number: 0 invalid, 1 the only one and 2 the last one of a shot that has no more, 3 to 6 first or last of several and the strongest of
-    /// them or not, 7 the only one of a shot that might have had several.
+    /// Autoware's number of the type of a return. 0: invalid. If shots have one return at most, 2 for a
+    /// sensor that picks the last return, else 1. If a shot may have several, 7 for the only one of its shot;
+    /// 3 for the first one and 4 for a later one if it is the strongest; otherwise 5 for the first one and 6
+    /// for a later one.
     fn return_type(&self, point: Point) -> u8 {
         let Point::Return(at) = point else { return 0 };
         let Some(strongest) = &self.strongest else {

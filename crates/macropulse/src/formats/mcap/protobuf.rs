@@ -8,7 +8,7 @@ use prost_types::{
     FileDescriptorProto, FileDescriptorSet,
 };
 
-/// What a field is.
+/// Type of a field.
 #[derive(Clone, Copy)]
 pub(super) enum Of {
     F8,
@@ -29,7 +29,7 @@ pub(super) enum Of {
     Many(&'static str),
 }
 
-/// A field: its name, its number, what it is.
+/// A field: its name, its number, its type.
 pub(super) type Field = (&'static str, i32, Of);
 
 /// A message: its name, its fields.

@@ -16,7 +16,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// What the files are called in messages to people.
+/// Name of the format in messages to people.
 const FORMAT: &str = "mcap";
 
 /// More than this many bytes cannot come of one that is compressed.
@@ -39,12 +39,12 @@ pub(in super::super) struct Messages {
     is_over: bool,
 }
 
-/// What the records of a file have told so far.
+/// Contents of the records of a file that were read so far.
 #[derive(Default)]
 struct Contents {
     /// The one topic whose clouds are wanted; all topics without it.
     wanted: Option<String>,
-    /// Names of the schemas, and of the channels with clouds or transforms what they have.
+    /// Names of the schemas, and the content of each channel with clouds or transforms.
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Content>,
     /// Topics with clouds.
@@ -85,7 +85,7 @@ impl Messages {
         })
     }
 
-    /// What the file says beside its clouds, as far as it was read.
+    /// The contents of the file beside its clouds, as far as it was read.
     pub fn about(&self) -> &About {
         &self.about
     }
@@ -141,7 +141,7 @@ impl Messages {
     }
 }
 
-/// What went wrong in the library, in our words.
+/// Describes an error of the library in our words.
 fn told(error: &McapError) -> String {
     match error {
         McapError::UnexpectedEof => "it ends within a record; the file was cut short".to_owned(),
@@ -235,8 +235,8 @@ impl Contents {
     }
 }
 
-/// What is left of a record. The parser of the library takes the memory that a length asks for before
-/// it looks whether the record is as long.
+/// The unread rest of a record. The parser of the library takes the memory that a length asks for before it
+/// looks whether the record is as long.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {

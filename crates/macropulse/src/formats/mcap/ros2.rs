@@ -23,7 +23,7 @@ const TF_MESSAGE: &str = "tf2_msgs/msg/TFMessage";
 /// The frames above that of the sensor.
 pub(super) const FRAMES: [&str; 3] = ["map", "odom", "base_link"];
 
-/// What every message with a stamp tells of its header.
+/// Definition of the header in the schema of every message with a stamp.
 macro_rules! header {
     () => {
         "\
@@ -99,8 +99,8 @@ float64 w
 "
 );
 
-/// What `ros2 bag` and nodes are told of the quality of service of a topic whose last message is for
-/// those, too, who come later.
+/// Quality of service, for `ros2 bag` and nodes, of a topic whose last message is also for nodes that
+/// subscribe later.
 const LATCHED: &str = "\
 - history: 1
   depth: 1

@@ -18,7 +18,7 @@ pub(super) struct Zstd {
     /// Bytes that are still to be decoded, from `at` on.
     pending: Vec<u8>,
     at: usize,
-    /// Whether a frame is under way, and whether a checksum ends it.
+    /// The frame that is under way, if any.
     frame: Option<Frame>,
 }
 
@@ -34,7 +34,7 @@ impl Zstd {
         Self { decoder, pending: Vec::new(), at: 0, frame: None }
     }
 
-    /// Decodes the head of a frame, or a block. False where more bytes are needed for it.
+    /// Decodes the head of a frame, or a block. Returns false if more bytes are needed for it.
     fn advance(&mut self) -> McapResult<bool> {
         let rest = self.pending.get(self.at..).unwrap_or_default();
         let length = match self.frame {
@@ -129,7 +129,7 @@ mod tests {
     use super::*;
     use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 
-    /// What `packed` unpacks to where input and output come in pieces.
+    /// Unpacks `packed`, with input and output in pieces.
     fn unpacked(packed: &[u8], piece: usize, room: usize) -> McapResult<Vec<u8>> {
         let (mut zstd, mut out) = (Zstd::new(), Vec::new());
         let mut pieces = packed.chunks(piece);

@@ -2,8 +2,8 @@
 
 use crate::design::detector::{Arming, Geiger};
 
-/// Cycles after which the cells are taken to have forgotten how they began, and so many dead times and delays of an
-/// afterpulse; no more cycles than `MOST` in all.
+/// Cells are taken to have forgotten how they began after `SETTLED` cycles and `DELAYS` dead times and delays
+/// of an afterpulse; no more cycles than `MOST` in all.
 const SETTLED: usize = 4;
 const DELAYS: usize = 8;
 const MOST: usize = 4096;
@@ -14,9 +14,10 @@ const EXACT: f64 = 1e-9;
 /// Mean counts in each bin of a cycle, of all cells together, for the mean detections `rates` of cells that are always
 /// armed.
 ///
-/// Of armed cells a share 1 − e^(−λᵢ/N) counts in bin i. It is armed again after the dead time, rounded to whole
-/// bins, on average in the middle of a bin, or with the next cycle. A share `afterpulsing` of the counts comes again, delayed exponentially, as far as its
-/// cell is armed by then. The burst is taken for long: the first cycles, which begin with all cells armed, do not count.
+/// A share 1 − e^(−λᵢ/N) of the armed cells counts in bin i. It is armed again after the dead time, rounded
+/// to whole bins, on average in the middle of a bin, or with the next cycle. A share `afterpulsing` of the
+/// counts comes again, delayed exponentially, as far as its cell is armed by then. The burst is taken for
+/// long: the first cycles, which begin with all cells armed, do not count.
 pub(super) fn counts(geiger: &Geiger, rates: &[f64], bin_fs: i64) -> Vec<f64> {
     let is_free = geiger.arming == Arming::FreeRunning;
     if is_free && geiger.dead_fs == 0 {

@@ -1,9 +1,9 @@
-//! What a receiver of histograms finds of a target that each pulse of a burst meets.
+//! Findings of a receiver of histograms for a target that each pulse of a burst meets.
 //!
-//! The mean counts of each bin follow from the light of a cycle and the cells. They are Poisson variables, nearly
-//! also where cells are blind for a while after a count, as a cell rarely counts twice within a pulse. Of histograms that
-//! are drawn with these means, with numbers of photons that are spread evenly over their distribution, the receiver's
-//! own rule says which show the target.
+//! The mean counts of each bin follow from the light of a cycle and the cells. They are Poisson variables,
+//! nearly also where cells are blind for a while after a count, as a cell rarely counts twice within a pulse.
+//! Histograms are drawn with these means, with numbers of photons that are spread evenly over their
+//! distribution. The receiver's own rule says which of them show the target.
 
 mod cells;
 
@@ -26,7 +26,7 @@ const CERTAIN: f64 = 24.0;
 /// Places in a bin over which a precision is the mean.
 const PHASES: i64 = 8;
 
-/// Dead times longer than so many cycles are refused: the cells take long to settle.
+/// Dead times of this number of cycles or more are refused: the cells take long to settle.
 pub(super) const MOST_CYCLES: i64 = 16;
 
 /// A sensor that counts in histograms, and its receiver.
@@ -43,7 +43,7 @@ pub(super) struct Counting {
     pulses: f64,
 }
 
-/// What is to be expected.
+/// Expected findings.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Chances {
     /// Probability of a return.
@@ -58,7 +58,7 @@ pub(super) struct Chances {
 struct Means {
     /// As counted.
     counted: Vec<f64>,
-    /// What the receiver makes of each count, and the exposure that it takes the bin to have.
+    /// Factor of the receiver on each count, and the exposure that it takes the bin to have.
     corrected: Vec<f64>,
     exposure: Vec<f64>,
     /// Counts that the receiver makes of each photon that is detected.
@@ -66,7 +66,7 @@ struct Means {
 }
 
 impl Counting {
-    /// Of a sensor that counts; `None` of others.
+    /// The counting of a sensor with histograms; `None` for others.
     pub fn of(design: &Design, method: &HistogramMethod) -> Option<Self> {
         let (Detector::Geiger(geiger), Some(burst), Some(histogram)) =
             (&design.detector, design.emission.burst(), design.readout.histogram())
@@ -92,8 +92,8 @@ impl Counting {
         self.false_alarm
     }
 
-    /// What is found at `range` metres of pulses of so many `photons` each, under `falling` detections a second
-    /// that come evenly.
+    /// Findings at `range` metres for pulses of this number of `photons` each, under `falling` detections a
+    /// second that come evenly.
     pub fn chances(&self, range: f64, photons: f64, falling: f64) -> Chances {
         let tof_fs = fs_from_s(tof_from_range(range));
         let Some(stretch) = self.decision.stretch(tof_fs) else { return Chances::default() };
@@ -162,8 +162,9 @@ impl Counting {
         Means { counted, corrected, exposure, per_photon }
     }
 
-    /// Standard deviation of the range, m: the Cramér–Rao bound of the time of a pulse in bins, I = Σ λ'ᵢ²/λᵢ \[Kay93\],
-    /// but no more than that of a photon, or of a time that is known to lie in a bin, the mean over places in it.
+    /// Standard deviation of the range, m: the Cramér–Rao bound of the time of a pulse in bins, I = Σ λ'ᵢ²/λᵢ
+    /// \[Kay93\]. It is no more than that of a photon, or of a time that is known to lie in a bin. The
+    /// variance is the mean over places in a bin.
     fn precision(
         &self,
         means: &Means,
@@ -219,7 +220,7 @@ fn totals(mean: f64) -> impl Iterator<Item = u64> {
     })
 }
 
-/// So many photons, each in a bin with a probability in proportion to its mean.
+/// Spreads `total` photons over the bins, each with a probability in proportion to the mean of a bin.
 fn shared(total: u64, means: &[f64], stream: &mut Stream) -> Vec<f64> {
     let (mut left, mut of_left) = (total, means.iter().sum::<f64>());
     let mut each = Vec::with_capacity(means.len());

@@ -1,4 +1,4 @@
-//! What the simulator does not model, and how large each effect would be.
+//! Effects that the simulator does not model, and how large each would be.
 //!
 //! These effects have no switch. An effect that a sensor or an environment may leave out is an
 //! [`crate::design::Effect`] of the list `idealised`. The formulas and their sources stand
@@ -76,7 +76,7 @@ impl Unmodelled {
         }
     }
 
-    /// What is assumed instead.
+    /// The assumption that is made instead.
     pub fn assumption(self) -> &'static str {
         match self {
             Self::AirReturn => "haze, fog and rain dim light and send none of it back",

@@ -8,8 +8,8 @@ use crate::design::{Budget, Design};
 use crate::environment::Environment;
 use crate::units::{range_from_tof, s_from_fs};
 
-/// What a pane reflects of light that falls on it square on, both faces together:
-/// 2·((n − 1)/(n + 1))², n = 1.5 (Fresnel).
+/// Share of light that a pane reflects if it falls on it square on, both faces together: 2·((n − 1)/(n +
+/// 1))², n = 1.5 (Fresnel).
 const PANE: f64 = 0.08;
 
 /// Solid angle of the sun, sr: its disk is 0.533° wide.
@@ -49,12 +49,12 @@ impl<'a> Sized<'a> {
         Ok(Self { design, link: operating.link, needed, backscatter })
     }
 
-    /// Up to which range, m, the light that the air sends back exceeds what a mark has to bring;
-    /// `None` where the air sends none back.
+    /// Range, m, up to which the light that the air sends back exceeds the light that a mark has to bring;
+    /// `None` if the air sends none back.
     ///
-    /// A volume of the backscatter β that is c·τ/2 deep shines like a surface of the reflectance
-    /// π·β·c·τ/2 that fills the beam. τ is the equivalent width of what a mark becomes in the
-    /// detector, √(π/(4·ln 2)) of its full width for a Gaussian.
+    /// A volume of the backscatter β that is c·τ/2 deep shines like a surface of the reflectance π·β·c·τ/2
+    /// that fills the beam. The equivalent width of a mark in the detector is τ, √(π/(4·ln 2)) of its full
+    /// width for a Gaussian.
     pub fn air_reach(&self) -> Option<f64> {
         let design = self.design;
         let tick = s_from_fs(design.clock.tick_fs);
@@ -110,9 +110,9 @@ pub fn overlap_from(budget: &Budget) -> f64 {
     budget.aperture / (budget.field.solid_angle / PI).sqrt()
 }
 
-/// The counts of sunlight over those of the scene on average: of a field that is filled with sunlit
-/// white, 1/ρ, and of one that holds the sun, π/(ρ·Ω), Ω the solid angle of the field or, if that is
-/// larger, of the sun. `None` where there is no sunlight.
+/// The counts of sunlight over those of the scene on average: 1/ρ in a field that is filled with sunlit
+/// white, and π/(ρ·Ω) in one that holds the sun. The solid angle Ω is that of the field or, if that is
+/// larger, of the sun. `None` if there is no sunlight.
 pub fn brightest(budget: &Budget, environment: &Environment) -> Option<(f64, f64)> {
     let is_dark = environment.irradiance(budget.wavelength)? * environment.albedo == 0.0;
     (!is_dark).then(|| {

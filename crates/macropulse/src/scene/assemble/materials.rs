@@ -1,4 +1,4 @@
-//! What surfaces are made of: the materials of the file, of the library, and guesses.
+//! Materials of surfaces: those of the file, those of the library, and guesses.
 
 use super::super::error::Error;
 use super::super::file::{ObjectTyped, SceneFile};

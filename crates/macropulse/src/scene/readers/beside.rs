@@ -4,12 +4,12 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::scene::error::Error;
 
-/// Where the files may lie that a mesh names.
+/// The places at which files that a mesh names may lie.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::scene) struct Reach<'a> {
     /// The folder of the scene.
     pub scene: &'a Path,
-    /// Whether they may lie anywhere else as well.
+    /// True if they may lie anywhere else as well.
     pub outside: bool,
 }
 

@@ -1,9 +1,9 @@
 //! glTF 2.0: `.glb`, and `.gltf` with buffers beside it or in `data:` URIs \[glTF2\].
 //!
-//! The crate `gltf` reads the document. It takes a sound file for granted in places, so everything
-//! that it may stumble over is checked before it is asked: `document` checks the container and the
-//! indices, `buffers` the bytes, and `accessor` the range of each accessor. What a file may ask for is
-//! bounded before memory is spent on it.
+//! The crate `gltf` reads the document. It takes a sound file for granted in places, so everything that it
+//! may stumble over is checked before it is asked: `document` checks the container and the indices, `buffers`
+//! the bytes, and `accessor` the range of each accessor. The sizes that a file asks for are limited before
+//! memory is spent on them.
 //!
 //! The crate keeps the numbers of nodes and colours in single precision: a node 50 km from the
 //! origin is placed to 4 mm.
@@ -81,8 +81,8 @@ fn whole(path: &Path) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     let mut file = open(path)?;
     let begins = file.fill_buf().map_err(unreadable)?;
-    // What is no glTF tells it by its beginning; of others one byte more than allowed tells that
-    // there are more.
+    // A file that is no glTF shows it by its beginning, which is all that is read. Otherwise one byte more
+    // than allowed is read, if there is one: it shows that the file is too large.
     let most = match document::may_begin(begins) {
         true => MOST_BYTES + 1,
         false => begins.len() as u64,
@@ -94,7 +94,7 @@ fn whole(path: &Path) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
-/// What is wrong, where something is.
+/// A reason to refuse the file.
 enum Fault {
     Damaged(Cow<'static, str>),
     Materials,
@@ -108,7 +108,7 @@ fn damaged<T>(problem: &'static str) -> Checked<T> {
     Err(Fault::Damaged(problem.into()))
 }
 
-/// What was met on the walk that is no surface, or more than a surface.
+/// Things met on the walk that are no surfaces, or more than surfaces.
 #[derive(Default)]
 struct Told {
     lines: usize,
@@ -120,7 +120,7 @@ struct Told {
 }
 
 impl Told {
-    /// What of the `document` is left out.
+    /// Returns a sentence on each thing in the `document` that is left out.
     fn left_out(self, document: &Document) -> Vec<String> {
         let mut said = Vec::new();
         if document.scenes().len() > 1 {
@@ -161,7 +161,7 @@ struct Walk<'a> {
     visits: usize,
     /// Vertices and triangles that the mesh may have.
     limits: [usize; 2],
-    /// What there is room for, and the file.
+    /// Room for vertices and triangles, and the path of the file.
     room: (Room, &'a Path),
     told: Told,
 }
@@ -175,8 +175,8 @@ impl Walk<'_> {
         }
     }
 
-    /// Every node of the scene, those above before those below. Where each has one parent at most, as
-    /// the format has it, none is met twice and there is an end.
+    /// Visits every node of the scene, parents before children. A node with more than one parent is refused,
+    /// as the format demands. So no node is visited twice, and the walk ends.
     fn all(&mut self, document: &Document) -> Checked<()> {
         let scene = document.default_scene().or_else(|| document.scenes().next());
         let mut is_met = vec![false; document.nodes().len()];
@@ -233,7 +233,7 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// Adds a surface of so many vertices and corners.
+    /// Adds a surface with these numbers of vertices and corners.
     fn surface(
         &mut self,
         primitive: &Primitive,

@@ -13,7 +13,7 @@ const LONGEST: usize = 1 << 24;
 const UTF_8: &[u8] = b"\xef\xbb\xbf";
 const UTF_16: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 
-/// What is wrong with a line, to go on after its number, or with the whole file.
+/// A problem with a line, in words that follow its number, or with the whole file.
 pub(super) enum Fault {
     Line(String),
     File(Error),
@@ -37,7 +37,7 @@ pub(super) struct Lines<'a, R> {
     path: &'a Path,
     is_joined: bool,
     line: Vec<u8>,
-    /// Of the line that was read last, from 1; of several that belong together, of the first.
+    /// Number of the line that was read last, from 1; of several that are joined, the number of the first.
     number: usize,
     /// Lines that were read.
     read: usize,
@@ -108,7 +108,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
         Ok(())
     }
 
-    /// What is wrong in the line that was read last.
+    /// Returns the error for a `problem` in the line that was read last.
     fn fault(&self, problem: impl AsRef<str>, remedy: &str) -> Error {
         let number = self.number;
         Error::mesh(self.path, format!("line {number} {}", problem.as_ref()), remedy)
@@ -153,9 +153,9 @@ impl<'a, R: BufRead> Lines<'a, R> {
 pub(super) struct UnixLines<R> {
     file: R,
     some: Vec<u8>,
-    /// Of `some`, what has been given.
+    /// Number of bytes of `some` that have been given out.
     given: usize,
-    /// Whether a return came last, behind which a line feed is no end of another line.
+    /// True if a carriage return came last; a line feed after it does not end another line.
     is_returned: bool,
 }
 
@@ -211,10 +211,10 @@ pub(super) fn text(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// The numbers that `words` say, as many as there are places for, each finite.
+/// Returns the next `N` numbers of `words`, each finite.
 ///
 /// # Errors
-/// The word that is none, or nothing where there are too few.
+/// The word that is no finite number, or `None` if there are too few words.
 pub(super) fn numbers<'a, const N: usize>(
     words: &mut impl Iterator<Item = &'a str>,
 ) -> Result<[f64; N], Option<&'a str>> {

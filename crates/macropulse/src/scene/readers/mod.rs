@@ -17,7 +17,7 @@ use super::room::Room;
 use crate::opened;
 pub(super) use beside::Reach;
 
-/// What to do about a material file that is named but not there.
+/// Verdict on a material file that is named but not there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum WithoutMaterials {
     /// The object brings a material of its own.
@@ -31,11 +31,11 @@ const MOST_BYTES: u64 = 2 << 30;
 
 const DAMAGED: &str = "the file is damaged or cut short: export it again";
 
-/// What was read of a file.
+/// The mesh of a file, and a note of what else it holds.
 #[derive(Debug, Default)]
 pub(super) struct Read {
     pub mesh: Mesh,
-    /// What the file holds beside it, in sentences that go on after the name of an object.
+    /// Sentences on what the file holds beside the mesh; they follow the name of an object.
     pub left_out: Vec<String>,
 }
 
@@ -74,7 +74,7 @@ pub(super) fn read_ply(bytes: &[u8], path: &Path) -> Result<Mesh, Error> {
     ply::read_from(&mut Cursor::new(bytes), path, Room::default())?.checked(path)
 }
 
-/// Whether `path` is a glTF file, whose axes and unit are fixed by its specification.
+/// Returns true if `path` is a glTF file, whose axes and unit are fixed by its specification.
 pub(super) fn is_gltf(path: &Path) -> bool {
     matches!(extension(path).as_str(), "glb" | "gltf")
 }
@@ -101,12 +101,12 @@ fn too_many_materials(path: &Path) -> Error {
     Error::mesh(path, "has more than 65536 materials", "export it in parts, or with fewer")
 }
 
-/// So many things, as people say it.
+/// Returns a number of things in words, with an `s` for all but one.
 fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-/// What is said of the lines and points of a file; `None` where there are none.
+/// Returns the sentence on the lines and points of a file; `None` if there are none.
 fn no_surfaces(lines: usize, points: usize) -> Option<String> {
     let said: Vec<String> = [(lines, "line"), (points, "point")]
         .into_iter()
@@ -121,8 +121,8 @@ fn no_surfaces(lines: usize, points: usize) -> Option<String> {
     (!said.is_empty()).then(|| format!("{} {verb} left out", said.join(" and ")))
 }
 
-/// Relative luminance of a linear colour, the guess for the diffuse reflectance of a surface of
-/// which only its looks are known \[BT.709\].
+/// Returns the relative luminance of a linear colour \[BT.709\]: the guess for the diffuse reflectance of a
+/// surface if only its looks are known.
 fn luminance([red, green, blue]: [f64; 3]) -> f64 {
     (0.2126 * red + 0.7152 * green + 0.0722 * blue).clamp(0.0, 1.0)
 }

@@ -1,7 +1,7 @@
 //! Wavefront OBJ with its MTL.
 //!
-//! Of the format that much is read as makes a surface: vertices, faces, and which material a face is
-//! of. Normals, texture and the names of parts do not change what light meets.
+//! Only the parts of the format that make a surface are read: vertices, faces, and the materials of faces.
+//! Normals, texture and the names of parts do not change what light meets.
 
 mod mtl;
 
@@ -57,19 +57,19 @@ pub(super) fn read(
 
 const TOO_MANY: &str = "has one material more than the 65536 that can be told apart";
 
-/// Most material files, each of which is looked for.
+/// Most material files; each one is looked for.
 const MOST_LIBRARIES: usize = 4096;
 
-/// What has been read so far.
+/// The part of a file that has been read so far.
 #[derive(Default)]
 struct Obj {
     mesh: Mesh,
     cutter: Cutter,
     /// Materials by name, of those that have a face.
     materials: HashMap<String, u16>,
-    /// What the faces that follow are made of: its name, and its index once it has a face.
+    /// Material of the faces that follow: its name, and its index once it has a face.
     material: (String, Option<u16>),
-    /// What lines `mtllib` name, each once, and all of them together in words.
+    /// Texts of the lines `mtllib`, each once: as a list, as a set, and the number of words in all of them.
     libraries: Vec<String>,
     known_libraries: HashSet<String>,
     named: usize,
@@ -189,7 +189,7 @@ impl Obj {
         Ok(())
     }
 
-    /// What the file holds beside the mesh.
+    /// Returns sentences on what the file holds beside the mesh.
     fn left_out(&self) -> Vec<String> {
         let free_form =
             "its curves and free-form surfaces are left out: only its polygons are read";
@@ -199,8 +199,8 @@ impl Obj {
     }
 }
 
-/// The index of the vertex that a corner of a face names, behind which texture and normal may be
-/// named, where there are `count` so far: from 1, or back from the last.
+/// Returns the index of the vertex that a corner of a face names; texture and normal may follow it. Vertices
+/// are numbered from 1, or back from the last of the `count` so far.
 fn corner(word: &str, count: usize) -> Result<u32, String> {
     let typed = word.split('/').next().unwrap_or(word);
     let refused = || format!("has {word:?} where a corner of a face is due");

@@ -26,10 +26,10 @@ const LONGEST_HEADER: usize = 1 << 20;
 /// Most vertices, faces and other elements together.
 const MOST_ELEMENTS: usize = 1 << 26;
 
-/// So many elements are read at once, before they are laid into the mesh.
+/// Elements that are read at once, before they are laid into the mesh.
 const AT_ONCE: usize = 1 << 14;
 
-/// What a list of corners is called.
+/// Names of a list of corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 pub(super) fn read(path: &Path, room: Room) -> Result<Mesh, Error> {
@@ -112,7 +112,7 @@ fn header(file: &mut impl BufRead, path: &Path) -> Result<(Header, usize), Error
     Ok((header, count))
 }
 
-/// What an element would need to be read.
+/// Returns the reason why an element cannot be read, if there is one.
 fn lacks(name: &str, element: &ElementDef) -> Option<String> {
     let is_list = |name: &&str| {
         let property = element.properties.get(*name);
@@ -134,12 +134,12 @@ fn lacks(name: &str, element: &ElementDef) -> Option<String> {
     }
 }
 
-/// What is behind the header.
+/// The part of a file behind the header.
 struct Body<'a, R: BufRead> {
     reader: Reader<R>,
     header: &'a Header,
     path: &'a Path,
-    /// Of the header.
+    /// Number of lines of the header.
     lines: usize,
     room: Room,
 }
@@ -171,7 +171,8 @@ impl<R: BufRead> Body<'_, R> {
     }
 }
 
-/// What is wrong with a line, behind so many others; the parser says it in several.
+/// Returns the message of the parser, which has several lines, in one line. The parser counts lines from
+/// behind the first `lines` of the file.
 fn told(fault: &ParseError, lines: usize) -> String {
     let said = fault.to_string();
     let line = said.split_once("String: '").and_then(|(_, rest)| rest.split(['\n', '\'']).next());
@@ -281,7 +282,7 @@ impl Faces {
         (mesh.vertices.len(), mesh.triangles.len() + self.early.triangles())
     }
 
-    /// Adds strips of triangles, of which each ends at a negative number.
+    /// Adds strips of triangles; each ends at a negative number.
     fn add_strips(&mut self, strips: &[Face], mesh: &mut Mesh) -> Result<(usize, usize), String> {
         for strip in strips {
             let material = self.material(strip, mesh)?;
@@ -303,8 +304,7 @@ impl Faces {
         }
     }
 
-    /// The material of this name, which is added if it is new; `None` where there are as many as can
-    /// be counted.
+    /// Returns the material of this name, which is added if it is new; `None` if no more can be counted.
     fn material_called(&mut self, name: &str, mesh: &mut Mesh) -> Option<u16> {
         if let Some(known) = self.known.get(name) {
             return Some(*known);

@@ -1,7 +1,7 @@
 //! STL, as text and as bytes.
 //!
-//! Of the text only corners and the ends of their loops count: how many solids there are, what they
-//! are called and where their normals point does not change what light meets.
+//! Only corners and the ends of their loops count in a text. The number of solids, their names and their
+//! normals do not change what light meets.
 
 use std::array;
 use std::io::{BufRead, Read};
@@ -35,8 +35,8 @@ pub(super) fn read(path: &Path, room: Room) -> Result<Mesh, Error> {
     }
 }
 
-/// Whether a file of this length that begins so is text. Many programs begin a binary file with
-/// `solid` as well; its length, or a byte that no text has, tells.
+/// Returns true if a file with this beginning and length is text. Many programs begin a binary file with
+/// `solid` as well; its length, or a byte that no text has, gives it away.
 fn is_text(begins: &[u8], length: u64) -> bool {
     let count = begins.get(80..HEADER).and_then(|count| count.try_into().ok());
     let facets = count.map(|count| u64::from(u32::from_le_bytes(count)));
@@ -97,7 +97,7 @@ fn text(file: &mut impl BufRead, path: &Path, room: Room) -> Result<Mesh, Error>
     Ok(text.mesh)
 }
 
-/// What has been read of a text so far.
+/// The part of a text that has been read so far.
 #[derive(Default)]
 struct Text {
     mesh: Mesh,
@@ -105,7 +105,7 @@ struct Text {
     cutter: Cutter,
     /// Those of a loop that has not ended.
     corners: Vec<[f64; 3]>,
-    /// Whether a facet has not ended.
+    /// True if a facet has not ended.
     is_open: bool,
 }
 

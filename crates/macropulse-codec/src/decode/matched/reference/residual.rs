@@ -30,7 +30,7 @@ pub(in crate::decode::matched) struct Residual<'a> {
     widened: Vec<u64>,
 }
 
-/// A cell is about so small a part of a macropulse: 1 to 64 machine words.
+/// Approximate number of cells in a macropulse. A cell has 1 to 64 machine words.
 const CELLS: i64 = 32;
 
 /// Ticks and places of one shot that are the same for all its lags.
@@ -111,7 +111,7 @@ impl<'a> Residual<'a> {
         }
     }
 
-    /// The time of which all that light of `shot` at `lag` explains or claims is part.
+    /// Returns the time that contains all that light of `shot` at `lag` explains or claims.
     pub fn touched(&self, shot: usize, lag: i64) -> Range<i64> {
         let (light, farther) = (self.sent.light(shot, lag), self.sent.farther());
         light.start - farther - i64::from(self.sent.width)..light.end + farther
@@ -127,7 +127,7 @@ impl<'a> Residual<'a> {
         self.renew(&self.touched(shot, lag));
     }
 
-    /// What is in `span`.
+    /// Returns the content of `span`.
     pub fn save(&mut self, span: &Range<i64>) -> Saved {
         let span = self.words_of(span);
         Saved { words: self.timelines().map(|timeline| timeline.words(&span).to_vec()), span }
@@ -141,7 +141,7 @@ impl<'a> Residual<'a> {
         self.count(&saved.span);
     }
 
-    /// Where unclaimed marks count as found.
+    /// Places at which unclaimed marks count as found.
     pub fn lit(&self) -> &Timeline {
         &self.lit
     }
@@ -151,7 +151,8 @@ impl<'a> Residual<'a> {
         &self.open
     }
 
-    /// Fewest places that are neither about marks of `shot` nor among those that are claimed, which are so many.
+    /// Returns the fewest places that are neither about marks of `shot` nor among the claimed ones, whose
+    /// number is `claimed`.
     pub fn fewest_places(&self, shot: usize, claimed: u32) -> u32 {
         let taken = claimed + self.sent.weight(shot) * self.sent.zone();
         (self.sent.takes_up() as u32).saturating_sub(taken)
@@ -227,16 +228,17 @@ impl<'a> Residual<'a> {
         (Marks { lit, of }, self.surroundings(beside, places, gate.without(own)))
     }
 
-    /// What speaks for light of a shot at `lag`.
+    /// Returns the evidence for light of a shot at `lag`, and its odds.
     pub fn peak(&self, gate: &Gate, lag: i64, places: &[u32], prior: &Prior) -> Peak {
         let (marks, around) = self.look(gate, lag, places);
         let evidence = evidence(marks, &around);
         Peak { lag, marks, evidence, odds: evidence + prior.at(lag) }
     }
 
-    /// `ticks` in `places`, of a shot with such a gate.
+    /// Returns the surroundings with this number of `ticks` in `places`, for a shot with this `gate`.
     ///
-    /// A mark is looked for in some ticks in a row. So many places are one trial, which one tick lights.
+    /// A mark is looked for in several ticks in a row. This number of places is one trial, which one tick
+    /// lights.
     pub fn surroundings(&self, ticks: u32, places: f64, gate: Gate) -> Surroundings {
         let width = f64::from(self.sent.width);
         let places = places.max(0.0) / width;
@@ -253,7 +255,8 @@ impl<'a> Residual<'a> {
         belief::contradiction(&lit, &dark, &around, prior.expected(lag))
     }
 
-    /// Marks of the word of `shot` in each of the `bits`, so many ticks behind the start of its light at `lag`.
+    /// Returns the marks of the word of `shot` in each of the `bits`. These are given in ticks behind the
+    /// start of its light at `lag`.
     fn in_bits(&self, shot: usize, lag: i64, bits: &[u32]) -> Vec<Marks> {
         let (start, word) = (self.sent.fired[shot] + lag, self.sent.word(shot).ticks());
         let of_bit = |bit: &u32| {
@@ -326,7 +329,7 @@ impl Gate {
         (self.ticks, self.places.to_bits())
     }
 
-    /// The same without so many ticks.
+    /// Returns the gate without this number of `ticks`.
     pub fn without(self, ticks: u32) -> Self {
         Self { ticks: self.ticks.saturating_sub(ticks), ..self }
     }

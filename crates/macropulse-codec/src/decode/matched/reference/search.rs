@@ -44,7 +44,7 @@ impl Peak {
         peaks.reduce(|one, other| if other.exceeds(&one) { other } else { one })
     }
 
-    /// Whether it has higher odds than `other`, or as high ones and is nearer.
+    /// True if it has higher odds than `other`, or equal odds and is nearer.
     fn exceeds(&self, other: &Self) -> bool {
         self.odds > other.odds || self.odds == other.odds && self.lag < other.lag
     }
@@ -118,8 +118,8 @@ impl Search {
         best
     }
 
-    /// The lags that have odds within so many nats, `below`, of the highest, and the least odds asked for. They are found
-    /// soonest if `likely` is one of them.
+    /// Returns the lags with odds within `below` nats of the highest, and with the least odds asked for. They
+    /// are found soonest if `likely` is one of them.
     pub fn near_best(
         &mut self,
         residual: &Residual,
@@ -198,8 +198,8 @@ impl Search {
         }
     }
 
-    /// Fewest marks for so many `nats` of evidence at any of the `lags`, and the least light about any of them; `None`
-    /// where there cannot be as many.
+    /// Returns the fewest marks that give this evidence in `nats` at any of the `lags`, and the least light
+    /// about any of them. `None` if the shot cannot have this number of marks there.
     fn bound(
         &mut self,
         (residual, gate): (&Residual, &Gate),
@@ -219,10 +219,10 @@ impl Search {
         may_be.then_some((fewest, light))
     }
 
-    /// Fewest marks of a shot for so many `nats` of evidence in such `light` or more.
+    /// Returns the fewest marks of a shot that give this evidence in `nats`, in this `light` or more.
     ///
-    /// The evidence grows with the places. But as no more of them are lit than there are, it falls with them where all
-    /// are lit.
+    /// The evidence grows with the places. But no more of them are lit than there are, so it falls with them
+    /// if all are lit.
     fn fewest(&mut self, (residual, gate): (&Residual, &Gate), nats: f64, light: Light) -> Fewest {
         let weight = residual.sent.weight(gate.shot);
         // Coarse numbers, so that many questions are the same.

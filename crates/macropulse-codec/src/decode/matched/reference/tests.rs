@@ -53,7 +53,7 @@ impl<'a> Plain<'a> {
         span.filter(|tick| of[(tick + ROOM) as usize]).count() as u32
     }
 
-    /// Whether a mark at `place` is lit by any of the ticks.
+    /// True if any of the ticks lights a mark at `place`.
     fn is_lit(&self, ticks: &[bool], place: i64) -> bool {
         Self::count(ticks, place..place + i64::from(self.sent.width)) > 0
     }
@@ -126,7 +126,7 @@ impl<'a> Plain<'a> {
         Prior::new(self.sent.reach(), &self.neighbours(shot))
     }
 
-    /// Where neighbours lead to expect light of `shot`.
+    /// Returns the lags at which neighbours lead to expect light of `shot`.
     fn neighbours(&self, shot: usize) -> Vec<i64> {
         let (rows, columns) = (&self.sent.log.row, &self.sent.log.column);
         let mut lags = Vec::new();
@@ -394,9 +394,9 @@ fn an_exhaustive_search_is_that_of_plain_code() {
     assert!(found > 100 && 20 * missed > found, "{missed} of {found}");
 }
 
-/// H₀: of shots that meet nothing no more than α = 0.05 have a return. N = 200 shots at each density of false ticks,
-/// seeds 1 and 2, jitter 0 and 0.4 ticks; rejected where as many have a chance below 10⁻³. Negative control: with the
-/// threshold lowered by 9 nats it is rejected at all densities, N = 100.
+/// H₀: of shots that meet nothing no more than α = 0.05 have a return. N = 200 shots at each density of false
+/// ticks, seeds 1 and 2, jitter 0 and 0.4 ticks; rejected if a count this high has a chance below 10⁻³.
+/// Negative control: with the threshold lowered by 9 nats it is rejected at all densities, N = 100.
 fn chance_is_not_believed(densities: &[u32]) {
     let sensor = Sensor::crowded(books().remove(0));
     let (alpha, log) = (0.05, sensor.log(100));
@@ -477,9 +477,9 @@ fn light_that_is_expected_is_found_as_without() {
     assert!(by_threshold > 20, "{by_threshold}");
 }
 
-/// What is weighed of a shot is what plain code counts, at every lag. N = 96 bands of six shots, all families, without
-/// jitter and with 1.5 ticks, photons apart and not; seeds 1 to 3. Negative control: where nothing of other shots is known,
-/// the evidence of one lag in ten thousand differs, and more.
+/// The marks and the evidence weighed for a shot are those of plain code, at every lag. N = 96 bands of six
+/// shots, all families, without jitter and with 1.5 ticks, photons apart and not; seeds 1 to 3. Negative
+/// control: if nothing of other shots is known, the evidence differs at more than one lag in ten thousand.
 #[test]
 fn what_is_weighed_is_counted_mark_by_mark() {
     let (mut lags_weighed, mut otherwise) = (0, 0);

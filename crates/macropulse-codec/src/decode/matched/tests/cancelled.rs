@@ -1,4 +1,4 @@
-//! Of macropulses without a gap all light is cancelled.
+//! All light of macropulses without a gap is cancelled.
 
 use super::*;
 use crate::decode::Error;
@@ -27,8 +27,8 @@ fn clear_light_is_cancelled_whatever_was_sent_before() {
     }
 }
 
-/// Of a shot in the word of another one, whole bits behind that, all marks of the first bit may be those of
-/// the other. N = 98 pairs of labels of which both fit at one lag alone, and are woven.
+/// If a shot lies in the word of another one, whole bits behind it, all marks of its first bit may be those
+/// of the other. N = 98 woven pairs of labels; each label of a pair fits at one lag alone.
 #[test]
 fn a_macropulse_that_begins_under_another_one_is_cancelled() {
     let sensor = Sensor { period: 10, ..Sensor::crowded(codebook()) };
@@ -67,9 +67,9 @@ fn a_macropulse_that_begins_under_another_one_is_cancelled() {
     assert_eq!(cases, 98);
 }
 
-/// Two pairs of shots of which the later one comes first and the earlier one before it ends, all others dark: neither is
-/// the shot after the last one found. N = 35 distances between the pairs, from within the light in flight to many times
-/// as far.
+/// Two pairs of shots, all others dark. In each pair the later shot comes first, and the earlier one before
+/// it ends: neither is the shot after the last one found. N = 35 distances between the pairs, from within the
+/// light in flight to many times as far.
 #[test]
 fn overlapping_light_is_cancelled_however_far_from_other_light_it_is() {
     let sensor = Sensor::crowded(codebook());
@@ -91,9 +91,9 @@ fn overlapping_light_is_cancelled_however_far_from_other_light_it_is() {
     }
 }
 
-/// Three bands of 40 shots, on a wall, scattered, and with false ticks, in which one tick in five is as early as the
-/// one before it, earlier, first of all, or last: what is found in a row is not asked for its order, and must not
-/// hide one.
+/// Three bands of 40 shots: on a wall, scattered, and with false ticks. One tick in five is as early as the
+/// one before it, earlier, first of all, or last. Ticks found in a row are not asked for their order, and
+/// must not hide such a tick.
 #[test]
 fn a_tick_out_of_order_is_refused_wherever_it_is() {
     let sensor = Sensor::crowded(codebook());

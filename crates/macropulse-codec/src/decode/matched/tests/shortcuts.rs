@@ -1,4 +1,4 @@
-//! What is passed by would not have been found.
+//! Light that is passed by would not have been found.
 
 use super::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -107,7 +107,7 @@ fn shots_that_are_too_dark_to_be_found_are_passed_by() {
         let missed = 92 + seed as u32 % 6;
         let weather = Weather { missed, ..CLEAR };
         let (mut ticks, _) = sensor.ticks(&log, weather, seed);
-        // Of those that are left one in two or in four is kept.
+        // One in two or in four of the ticks that are left is kept.
         let kept = if seed % 2 == 0 { 2 } else { 4 };
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         ticks.tick.retain(|_| chance.next_u32().is_multiple_of(kept));

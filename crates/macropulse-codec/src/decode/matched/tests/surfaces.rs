@@ -10,8 +10,8 @@ fn several(sensor: &Sensor, jitter: f64) -> Receiver {
 
 #[test]
 fn two_surfaces_are_two_returns_in_clear_air_and_in_poor_light() {
-    // N = 1000. With jitter a mark counts in any of three ticks, and light of others lies in one place
-    // of five: of a shot with few lit bits chance gives nearly as many marks.
+    // N = 1000. With jitter a mark counts in any of three ticks, and light of others lies in one place of
+    // five. Chance then gives nearly the number of marks that a shot with few lit bits has.
     let weathers = [((0, 0, 0), 0.0, 0.97), ((20, 4, 0), 0.0, 0.97), ((20, 4, 15), 0.3, 0.65)];
     let sensor = Sensor::crowded(codebook());
     let log = sensor.log(1000);
@@ -64,10 +64,10 @@ fn returns_come_in_the_order_of_shots_and_their_surfaces() {
     assert!(found.marks.iter().copied().eq(weights) && found.peak == found.marks);
 }
 
-/// H₀: a shot that met one surface has a second return with probability α = 10⁻⁴ at most, the
-/// false alarm accepted. N = 24 000 shots, seeds 1 to 6, in clear air and with 30 % of the
-/// marks missed in stray light; rejected where so many have a chance below 10⁻³. Negative
-/// control: one shot in 500 with a second surface is noticed.
+/// H₀: a shot that met one surface has a second return with probability α = 10⁻⁴ at most, the false alarm
+/// accepted. N = 24 000 shots each in clear air, with 30 % of the marks missed in stray light, and with
+/// jitter; seeds 1 to 6. It is rejected if a count this high has a chance below 10⁻³. Negative control: one
+/// shot in 500 with a second surface is noticed.
 #[test]
 fn one_surface_is_one_return() {
     let poor = Weather { missed: 30, false_ticks: 5, ..CLEAR };

@@ -6,7 +6,7 @@ use crate::code::{Codebook, Family, Keying, Separated};
 use crate::decode::Receiver;
 use crate::{ShotLog, decode::Sampled};
 
-/// Noise, in photons, none of which is in the signal.
+/// Noise, in photons; the signal has none of it.
 const SIGMA: f32 = 36.0;
 
 fn sampling() -> Sampling {
@@ -27,8 +27,8 @@ fn sampling() -> Sampling {
     }
 }
 
-/// What becomes of a shot whose three marks are so strong at a lag of 100, of which those that are
-/// `blind` tell nothing; and what is left at the first, with how uncertain that is.
+/// Tests a shot whose three marks have these `heights` at a lag of 100, the `blind` ones telling nothing.
+/// Returns the light found, and the signal left at the first mark with its doubt.
 fn tested(heights: [f32; 3], blind: [bool; 3]) -> (Option<Found>, (f32, f32)) {
     tested_beside([0.0; 3], heights, blind)
 }
@@ -38,7 +38,7 @@ fn tested_again(heights: [f32; 3], blind: [bool; 3], doubt: f32) -> Option<Found
     tested_in(true, doubt, ([0.0; 3], heights, blind)).0
 }
 
-/// The same where other light, so strong, comes four ticks behind the first mark and the second, and
+/// The same with `others`, the heights of other light, four ticks behind the first mark and the second, and
 /// four before the last.
 fn tested_beside(
     others: [f32; 3],
@@ -48,7 +48,7 @@ fn tested_beside(
     tested_in(false, 0.0, (others, heights, blind))
 }
 
-/// The same, at the first look or `again`, where what was taken away from the last mark is in `doubt`.
+/// The same, at the first look or again, with a doubt about what was taken away from the last mark.
 fn tested_in(
     is_again: bool,
     doubt_of_last: f32,
@@ -91,12 +91,12 @@ fn tested_in(
     (found, (residual.filtered.signal[first], residual.filtered.doubt[first]))
 }
 
-/// How strong a mark of `count` equal ones is whose sum is so many standard deviations.
+/// Returns the height of each of `count` equal marks whose sum is `score` standard deviations.
 fn height(score: f32, count: f32) -> f32 {
     score * SIGMA / count.sqrt()
 }
 
-/// 10⁻⁵ false returns in 100 001 lags: 10⁻¹⁰ each, of which the normal bound is 6.36 σ.
+/// 10⁻⁵ false returns in 100 001 lags are 10⁻¹⁰ each; the normal bound of that is 6.36 σ.
 #[test]
 fn more_is_asked_of_words_of_which_a_mark_is_missing() {
     let all = [false; 3];
@@ -130,8 +130,8 @@ fn two_marks_may_differ_where_nothing_else_explains_them() {
     assert!(tested_again(heights, one, 10.0).is_none());
 }
 
-/// A mark of more than half of full scale, 5000 photons, and one of next to nothing. Control: two of which it is
-/// not known how strong they are.
+/// A mark of more than half of full scale, 5000 photons, and one of next to nothing. Control: two whose
+/// strength is not known.
 #[test]
 fn a_mark_that_is_nearly_clipped_is_not_equal_to_a_faint_one() {
     let one = [true, false, false];
@@ -139,8 +139,9 @@ fn a_mark_that_is_nearly_clipped_is_not_equal_to_a_faint_one() {
     assert!(tested([0.0, 5500.0, 9500.0], one).0.is_some());
 }
 
-/// Two marks that count, of which one has light of others: noise must be 4.0 deviations in the other, with 6.36 + 0.5
-/// deviations of the sum and a cap of 1.36 above it. Control: by the cap of three marks, 2.5, 3.4 would do.
+/// Two marks that count, one with light of others. Noise in the other must be 4.0 deviations, with 6.36 + 0.5
+/// deviations of the sum and a cap of 1.36 above that noise. Control: by the cap of three marks, 2.5, 3.4
+/// would do.
 #[test]
 fn noise_beside_light_of_others_is_no_word_of_which_a_mark_is_missing() {
     let found = |faint| tested([0.0, SIGMA * faint, 300.0], [true, false, false]).0.is_some();
@@ -177,7 +178,7 @@ fn what_is_found_is_taken_away() {
     assert!(left.abs() < 1.0 && (doubt - 84.6).abs() < 0.1, "{left} ± {doubt}");
     let (found, (left, doubt)) = tested([100.0; 3], [false; 3]);
     assert!(found.is_none() && (left - 100.0).abs() < 1e-3 && doubt == 0.0, "{left} ± {doubt}");
-    // What is left of clipped pulses tells nothing.
+    // The remains of clipped pulses tell nothing.
     let (found, (_, doubt)) = tested([1e5; 3], [false; 3]);
     assert!(found.unwrap().is_clipped && doubt == f32::INFINITY);
 }

@@ -28,7 +28,7 @@ fn pulse(steady: f64) -> Vec<f64> {
     rates
 }
 
-/// Counts of so many cycles of the same light.
+/// Returns the counts of `cycles` of the same light.
 fn counts(cells: Cells, cycles: u32, rates: &[f64], steady: f64, seed: u64) -> Vec<u32> {
     let mut counts = Vec::new();
     let lit = std::iter::once((cycles, rates.to_vec()));
@@ -100,9 +100,9 @@ fn cells_that_are_followed_give_the_same_counts() {
     assert!(deviation(&drawn, &once) > 10.0);
 }
 
-/// H0: in steady light of rate r on each cell with dead time τ, the counts are r/(1 + r·τ). r·τ = 0.6, N cells 1 and
-/// 8, 4·10⁵ to 2·10⁶ counts, seed 4; counts behind a dead time vary less than Poisson ones, so α < 10⁻⁶ at 4.9.
-/// Control: r is rejected.
+/// H0: in steady light of rate r on each cell with dead time τ, the counts are r/(1 + r·τ). Here r·τ = 0.6,
+/// N cells 1 and 8, 4·10⁵ to 2·10⁶ counts, seed 4. Counts behind a dead time vary less than Poisson ones, so
+/// α < 10⁻⁶ at 4.9. Control: r is rejected.
 #[test]
 fn a_dead_time_takes_its_share_of_steady_light() {
     for number in [1, 8] {

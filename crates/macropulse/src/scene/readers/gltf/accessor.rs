@@ -1,4 +1,4 @@
-//! What an accessor of a glTF document says: places and indices, wherever their bytes lie.
+//! Contents of an accessor of a glTF document: places and indices, wherever their bytes lie.
 
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ const BEYOND: &str = "has an accessor that reaches beyond its buffer";
 /// The bytes of all buffers.
 pub(super) struct Buffers<'a> {
     pub bytes: Vec<Bytes<'a>>,
-    /// Whether places may be whole numbers, by `KHR_mesh_quantization`.
+    /// True if places may be whole numbers, by `KHR_mesh_quantization`.
     pub quantised: bool,
 }
 
@@ -142,7 +142,7 @@ impl Buffers<'_> {
     }
 }
 
-/// Three numbers each, of so many bytes.
+/// Returns the numbers in `bytes`, each of `N` bytes, in threes.
 fn threes<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<[f64; 3]> {
     let numbers: Vec<f64> = bytes.as_chunks().0.iter().map(|bytes| number(*bytes)).collect();
     numbers.as_chunks().0.to_vec()

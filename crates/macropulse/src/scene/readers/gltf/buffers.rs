@@ -15,9 +15,9 @@ use super::super::{DAMAGED, Reach, open};
 use super::{Bytes, MOST_BYTES, TOO_LARGE};
 use crate::scene::error::Error;
 
-/// The bytes of each buffer of `document`, the file at `path`, in files within `reach`; `binary` are
-/// those that the file itself brings. Never more than it declares, and nothing before the declared lengths have been
-/// added up.
+/// Returns the bytes of each buffer of `document`, the file at `path`, in files within `reach`; `binary` are
+/// those that the file itself brings. Files beside it are read up to the declared length. No buffer is read
+/// before the declared lengths have been added up.
 ///
 /// # Errors
 /// If a buffer is shorter than declared, or its file cannot be read or lies where it may not, or all
@@ -49,7 +49,7 @@ pub(super) fn buffers<'a>(
     Ok(buffers)
 }
 
-/// The bytes of a `data:` URI or of a file beside the document, as many as are declared.
+/// Returns the bytes of a `data:` URI, or of a file beside the document up to the declared length.
 fn named((path, reach): (&Path, Reach<'_>), buffer: &Buffer, uri: &str) -> Result<Vec<u8>, Error> {
     if let Some(inline) = uri.strip_prefix("data:") {
         let text = inline.split_once(";base64,").map(|(_, text)| unescaped(text));

@@ -46,7 +46,7 @@ const SHAPES: [&str; 4] = [
     "EXT_mesh_gpu_instancing",
 ];
 
-/// Whether an extension adds to the shape what is not read here.
+/// Returns true if an extension adds something to the shape that is not read here.
 pub(super) fn adds_shape(name: &str) -> bool {
     SHAPES.contains(&name)
 }
@@ -55,13 +55,14 @@ fn is_harmless(name: &str) -> bool {
     name == QUANTISED || HARMLESS.iter().any(|begins| name.starts_with(begins))
 }
 
-/// Whether a file that begins so may be a glTF: a container, or text that is an object.
+/// Returns true if a file with this beginning may be a glTF: a container, or text that is an object or still
+/// blank.
 pub(super) fn may_begin(bytes: &[u8]) -> bool {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     bytes.starts_with(b"glTF") || text.is_empty() || text.starts_with(b"{")
 }
 
-/// Whether the bytes are a container of glTF 1.0.
+/// Returns true if the bytes are a container of glTF 1.0.
 pub(super) fn is_old_container(bytes: &[u8]) -> bool {
     bytes.starts_with(b"glTF\x01\0\0\0")
 }
@@ -69,7 +70,7 @@ pub(super) fn is_old_container(bytes: &[u8]) -> bool {
 /// JSON and binary part of a file: those of a `.glb`, or all of it and nothing.
 ///
 /// # Errors
-/// What is wrong, if the lengths in a container do not add up.
+/// If the lengths in a container do not add up.
 pub(super) fn container(bytes: &[u8]) -> Result<[Bytes<'_>; 2], String> {
     const HEADER: usize = 12;
     if !bytes.starts_with(b"glTF") {
@@ -122,7 +123,7 @@ pub(super) fn document(path: &Path, text: &[u8]) -> Result<Document, Error> {
     Ok(Document::from_json_without_validation(root))
 }
 
-/// Whether `text` is a document of glTF 1.0, where meshes have names in place of numbers.
+/// Returns true if `text` is a document of glTF 1.0, in which meshes have names in place of numbers.
 fn is_of_version_1(text: &[u8]) -> bool {
     #[derive(Deserialize)]
     struct Old {
@@ -151,12 +152,11 @@ fn stilled(text: &[u8]) -> Option<Vec<u8>> {
     serde_json::to_vec(&document).ok()
 }
 
-/// Most buffers of a document, each of which may be a file to open.
+/// Most buffers of a document; each may be a file to open.
 const MOST_BUFFERS: usize = 4096;
 
-/// Refuses nodes with several parents: they would be there once for each way that leads to them, and
-/// the ways may double from level to level. What remains are trees, and cycles that no scene is
-/// above of.
+/// Refuses nodes with several parents: they would be there once for each way that leads to them, and the ways
+/// may double from level to level. Trees remain, and cycles that no scene leads to.
 fn check_nodes(root: &Root) -> Result<(), String> {
     let mut has_parent = vec![false; root.nodes.len()];
     for (index, node) in root.nodes.iter().enumerate() {
@@ -174,8 +174,8 @@ fn check_nodes(root: &Root) -> Result<(), String> {
     }
 }
 
-/// Refuses indices that lead nowhere and values that mean nothing. What is only missing is left
-/// to those who need it: many files lack the bounds of their positions.
+/// Refuses indices that lead nowhere and values that mean nothing. Missing values are left to the code that
+/// needs them: many files lack the bounds of their positions.
 fn check(root: &Root) -> Result<(), String> {
     // The check of the crate itself looks these accessors up unchecked, and panics.
     let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);

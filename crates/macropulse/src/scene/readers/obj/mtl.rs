@@ -7,7 +7,7 @@ use super::super::lines::{Lines, numbers};
 use super::super::{Reach, luminance, open};
 use crate::scene::error::Error;
 
-/// What is read of material files.
+/// Looks of the materials in material files, by name.
 pub(super) type Library = HashMap<String, Looks>;
 
 /// How a material looks.
@@ -15,7 +15,7 @@ pub(super) type Library = HashMap<String, Looks>;
 pub(super) struct Looks {
     /// How bright it is, from 0 to 1, where that is known.
     pub brightness: Option<f64>,
-    /// Whether light goes through it or through holes in it.
+    /// True if light goes through it or through holes in it.
     pub is_transparent: bool,
 }
 
@@ -96,8 +96,8 @@ fn last_number(told: &str) -> Option<f64> {
     told.split('#').next()?.split_whitespace().last()?.parse().ok()
 }
 
-/// How bright a colour is, as a line `Kd` tells it: red, green and blue, of which one alone stands for
-/// all; X, Y and Z, of which Y is the luminance; or a spectrum, which is not read.
+/// Returns the brightness of a colour in a line `Kd`; `None` for a spectrum, which is not read. The line
+/// holds red, green and blue, or one number for all three, or X, Y and Z, where Y is the luminance.
 fn colour(told: &str) -> Result<Option<f64>, String> {
     let mut words = told.split_whitespace().take_while(|word| !word.starts_with('#')).peekable();
     if words.next_if_eq(&"spectral").is_some() {
