@@ -8,6 +8,7 @@
 
 mod codes;
 mod columns;
+mod dictionaries;
 mod error;
 mod files;
 mod images;

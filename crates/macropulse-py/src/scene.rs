@@ -71,7 +71,7 @@ impl Scene {
         }
     }
 
-    /// True if its text says everything, in any folder: it names no meshes and no files.
+    /// True if its text says everything, in any folder: it names no meshes and no other lidars.
     pub fn is_self_contained(&self) -> bool {
         let table: Table = self.scene.text.parse().unwrap_or_default();
         let objects = table.get("object").and_then(toml::Value::as_array);

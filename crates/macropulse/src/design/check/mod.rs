@@ -1,6 +1,8 @@
 //! From typed keys to a checked `Design`.
 
 mod effectless;
+mod emitted;
+mod misplaced;
 
 use std::sync::OnceLock;
 
@@ -19,10 +21,10 @@ use super::modulation::ModulationFile;
 use super::readout::{AdcFile, HistogramFile, SpectrumFile, TdcFile};
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
-use super::{Clock, Coding, Design, Detector, Effect, Emission, Error, Light, Readout, Scan};
+use super::{Clock, Design, Detector, Effect, Emission, Error, Light, Scan};
 use crate::names::nearest;
-use crate::schema::{self, Fault, Misfit};
-use crate::units::{RMS_OF_FWHM, fs_from_s, range_from_tof, s_from_fs, tof_from_range};
+use crate::schema;
+use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs};
 
 /// A sensor file as typed: keys with units, nothing checked yet but names and types.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -94,32 +96,11 @@ const VERSION: u32 = 1;
 /// Largest range error, m, up to which a return may count as right.
 const WIDEST: f64 = 0.35;
 
-/// Tables of the sensor file that held sun and air before these belonged to the scene.
-const MOVED: [&str; 3] = ["sun", "atmosphere", "environment"];
-
-/// Detectors that are described by parts now: their former names, and what to write.
-const FORMER: [(&str, &str); 2] = [
-    (
-        "linear",
-        "is a [detector.photodiode] with a [comparator] now: false_alarm_hz, timing and hysteresis belong in \
-         [comparator], the other keys in [detector.photodiode], where bandwidth_mhz is the electrical one, \
-         0.709 times what stood here",
-    ),
-    (
-        "sampled",
-        "is a [detector.photodiode] with an [adc] now: sample_ps, bits and step_photons belong in [adc], the \
-         other keys in [detector.photodiode]",
-    ),
-];
-
-/// Keys of a scene file that no sensor has.
-const OF_SCENES: [&str; 4] = ["object", "ground", "material", "interferers"];
-
 pub(super) fn design(chain: &Chain) -> Result<Design, Error> {
-    refuse_moved(chain)?;
-    refuse_former(chain)?;
+    misplaced::refuse_moved(chain)?;
+    misplaced::refuse_former(chain)?;
     let file: SensorFile =
-        schema::read(&chain.merged).map_err(|misfit| typed_wrongly(chain, &misfit))?;
+        schema::read(&chain.merged).map_err(|misfit| misplaced::typed_wrongly(chain, &misfit))?;
     if file.version != VERSION {
         let message = format!("is {}, but this program reads version {VERSION}", file.version);
         return Err(chain.error("version", message));
@@ -297,160 +278,7 @@ fn resolved(detector: &Detector, light: &Light, clock: Clock) -> f64 {
     range_from_tof(4.0 * libm::hypot(sigma, s_from_fs(clock.tick_fs))).min(WIDEST)
 }
 
-/// Refuses keys of sun and air, and says where they live.
-fn refuse_moved(chain: &Chain) -> Result<(), Error> {
-    for table in MOVED {
-        let Some(typed) = chain.merged.get(table) else { continue };
-        let key = typed.as_table().and_then(|keys| keys.keys().next());
-        let (path, key) = match key {
-            Some(key) => (format!("{table}.{key}"), key.as_str()),
-            None => (table.to_owned(), "sky"),
-        };
-        let message = format!(
-            "sun and air belong to the scene: write `{key}` under [environment] in the scene file, \
-             or --set environment.{key}=… where a command has a scene or an --environment"
-        );
-        return Err(chain.error(&path, message));
-    }
-    Ok(())
-}
-
-/// Refuses detectors by their former names.
-fn refuse_former(chain: &Chain) -> Result<(), Error> {
-    let detector = chain.merged.get("detector").and_then(toml::Value::as_table);
-    let former = FORMER.iter().find(|(name, _)| detector.is_some_and(|it| it.contains_key(*name)));
-    former.map_or(Ok(()), |(name, now)| Err(chain.error(&format!("detector.{name}"), *now)))
-}
-
-/// The error of a file that does not fit, with the tables in which an unknown key may stand.
-fn typed_wrongly(chain: &Chain, misfit: &Misfit) -> Error {
-    let (path, message, key) = (misfit.path(), misfit.message(), misfit.key());
-    let known = match &misfit.fault {
-        Fault::MissingKey(_) => return chain.lacks(&path, &message),
-        Fault::UnknownKey { known } => known.iter().map(String::as_str),
-        Fault::Value(_) => return chain.error(&path, message),
-    };
-    if nearest(key, known).is_some() {
-        return chain.error(&path, message);
-    }
-    // A key that stands in another table is no misspelt one.
-    let homes = schema::homes(&super::schema(), key);
-    let elsewhere: Vec<String> = homes.iter().take(3).map(|home| format!("[{home}]")).collect();
-    let message = match &elsewhere[..] {
-        [_, ..] => format!("unknown key `{key}` here; it belongs in {}", elsewhere.join(" or ")),
-        [] if OF_SCENES.contains(&key) => {
-            format!("unknown key `{key}` of a sensor; it is one of a scene, as --set scene:{key}…")
-        }
-        [] => message,
-    };
-    chain.error(&path, message)
-}
-
 impl Check<'_> {
-    /// Returns the light that a shot sends.
-    fn emission(&self, file: &SensorFile, scan: &Scan, clock: Clock) -> Result<Emission, Error> {
-        let coding = self.coding(file.code.as_ref(), scan, clock)?;
-        if !file.is_pulsed() {
-            return self.without_pulses(file, coding, scan);
-        }
-        let Some(burst) = &file.burst else { return Ok(Emission::Marks(coding)) };
-        if file.code.is_some() {
-            return self.refuse("burst", "repeats single pulses: leave out [code], or [burst]");
-        }
-        Ok(Emission::Burst(self.burst(burst, coding, clock)?))
-    }
-
-    /// The same for light that is modulated, in power or in frequency. It allows no pulses, and needs a
-    /// detector that follows it.
-    fn without_pulses(
-        &self,
-        file: &SensorFile,
-        shot: Coding,
-        scan: &Scan,
-    ) -> Result<Emission, Error> {
-        let (table, detector) = match file.modulation {
-            Some(_) => ("modulation", "lock-in"),
-            None => ("chirp", "coherent"),
-        };
-        for (key, is_there) in [
-            ("code", file.code.is_some()),
-            ("burst", file.burst.is_some()),
-            ("histogram", file.histogram.is_some()),
-            ("chirp", file.modulation.is_some() && file.chirp.is_some()),
-        ] {
-            if is_there {
-                let of = if key == "chirp" { "a frequency" } else { "pulses" };
-                let message = format!(
-                    "is of {of}, and the light of a [{table}] has none: leave one of them out"
-                );
-                return self.refuse(key, message);
-            }
-        }
-        if file.detector.only().is_none_or(|only| only.name != detector) {
-            let message = format!("must be `{detector}` where light has a [{table}]");
-            return self.refuse("detector", message);
-        }
-        match (&file.modulation, &file.chirp) {
-            (Some(modulation), _) => {
-                Ok(Emission::Modulated(self.modulation(modulation, shot, scan.light_range)?))
-            }
-            (None, Some(chirp)) => {
-                Ok(Emission::Chirped(self.chirp(chirp, shot, scan.light_range)?))
-            }
-            (None, None) => Ok(Emission::Marks(shot)),
-        }
-    }
-
-    /// Clock and readout of light with a chirp.
-    fn chirped_readout(&self, file: &SensorFile) -> Result<(Clock, Readout), Error> {
-        match &file.spectrum {
-            Some(spectrum) => self.spectrum(spectrum),
-            None => {
-                Err(self.chain.lacks("spectrum", "records the beats of a [chirp], and is missing"))
-            }
-        }
-    }
-
-    /// Checks that bursts and histograms go together. A sensor that repeats pulses adds up their counts, in
-    /// bins that lie within a cycle and hold the range gate.
-    fn cycles(
-        &self,
-        file: &SensorFile,
-        emission: &Emission,
-        (clock, readout): (Clock, &Readout),
-        scan: &Scan,
-    ) -> Result<(), Error> {
-        let (burst, histogram) = match (emission.burst(), readout.histogram()) {
-            (None, None) => return Ok(()),
-            (Some(_), None) => {
-                return self.refuse("burst", "is added up in a [histogram], which is missing");
-            }
-            (None, Some(_)) => {
-                let message = "adds up the pulses of a [burst], which is missing";
-                return Err(self.chain.lacks("histogram", message));
-            }
-            (Some(burst), Some(histogram)) => (burst, histogram),
-        };
-        if file.detector.only().is_none_or(|only| only.name != "geiger") {
-            return self.refuse("detector", "must be `geiger` where counts go into a [histogram]");
-        }
-        let last_fs = i64::from(histogram.bins) * clock.tick_fs;
-        if last_fs > burst.interval_fs {
-            let most = burst.interval_fs / clock.tick_fs;
-            let message = format!("is {}, but between two pulses lie {most} bins", histogram.bins);
-            return self.refuse("histogram.bins", message);
-        }
-        let last = fs_from_s(tof_from_range(scan.max_range)) / clock.tick_fs;
-        if last >= i64::from(histogram.bins) {
-            let message = format!(
-                "is {}, but the range gate ends in bin {last}: more bins, or a shorter max_range_m",
-                histogram.bins
-            );
-            return self.refuse("histogram.bins", message);
-        }
-        Ok(())
-    }
-
     /// Checks that the beam stands while a shot is sent, as it is simulated. If it `moves`, that has to be
     /// idealised.
     fn stands(&self, emission: &Emission, scan: &Scan, moves: bool) -> Result<(), Error> {
@@ -590,16 +418,6 @@ mod tests {
     use std::path::Path;
 
     use crate::design::{Design, Readout};
-
-    #[test]
-    fn detectors_by_their_former_names_are_told_the_new_ones() {
-        for (name, now) in [("linear", "[comparator]"), ("sampled", "[adc]")] {
-            let set = [(format!("detector.{name}.gain"), "2".to_owned())];
-            let told = Design::open("coded-practical", &set).unwrap_err().to_string();
-            let begins = format!("--set: detector.{name}: is a [detector.photodiode] with ");
-            assert!(told.starts_with(&begins) && told.contains(now), "{told}");
-        }
-    }
 
     /// A comparator or an ADC that a file puts behind a photodiode replaces that of the sensor that it
     /// extends.

@@ -3,10 +3,12 @@
 //! The target is extended, Lambertian and square on, and fills the surroundings: the light of the other shots
 //! in flight comes from it too. The beam is a line.
 
+mod needed;
+mod not_modelled;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use macropulse_codec::RecordKind;
 use macropulse_codec::decode::{self, Method};
 
 use super::best_lag::{BestLag, Sight};
@@ -16,7 +18,7 @@ use super::sidelobes::{Aside, Sidelobes};
 use super::{balanced, beat, belief, histogram, matched, phase, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
-use crate::design::{Design, Detector, Wave};
+use crate::design::{Design, Detector};
 use crate::environment::Environment;
 use crate::units::{RMS_OF_FWHM, range_from_tof, s_from_fs, tof_from_range};
 
@@ -37,10 +39,6 @@ pub enum Error {
         remedy: String,
     },
 }
-
-/// Amplitude over the threshold at which the marks of a word must be told apart for there to be a forecast.
-/// Marks of this amplitude are twice as bright as marks that are just seen.
-const TOLD_APART: f64 = 2.0;
 
 /// A sensor in an environment, perhaps with more or less light than it has.
 #[derive(Debug, Clone)]
@@ -124,7 +122,7 @@ impl<'a> Forecaster<'a> {
     /// follow each other so soon that they are one to the detector.
     pub fn new(design: &'a Design, environment: &Environment) -> Result<Self, Error> {
         let operating = Operating::of(design, environment)?;
-        if let Some((what, remedy)) = not_modelled(design, &operating) {
+        if let Some((what, remedy)) = not_modelled::reason(design, &operating) {
             return Err(Error::NotModelled { sensor: design.name.clone(), what, remedy });
         }
         let codebook = &design.emission.coding().codebook;
@@ -486,53 +484,7 @@ impl<'a> Forecaster<'a> {
             bound: chances.bound,
         }
     }
-
-    /// The factor on the light that gives probability `pd` to a target of `reflectance` at `range`
-    /// metres; `None` where 10⁹ times the light would not.
-    pub fn light_needed(&self, pd: f64, reflectance: f64, range: f64) -> Option<f64> {
-        let enough = |factor: f64| self.with_light(factor).forecast(reflectance, range).pd >= pd;
-        // Cells that count once a pulse are blinded by far too much of it, and taps are full.
-        let most = match self.counting.is_some() || self.phases.is_some() {
-            false => 1e9,
-            true => (-9..=9).map(|power| 10_f64.powi(power)).find(|factor| enough(*factor))?,
-        };
-        bisect(1e-9, most, enough)
-    }
-
-    /// The factor on the background that still leaves probability `pd` to a target of
-    /// `reflectance` at `range` metres; `None` where not even 10⁻¹² of it does.
-    pub fn background_bearable(&self, pd: f64, reflectance: f64, range: f64) -> Option<f64> {
-        let bears = |divisor: f64| {
-            self.with_background(1.0 / divisor).forecast(reflectance, range).pd >= pd
-        };
-        bisect(1e-6, 1e12, bears).map(|divisor| 1.0 / divisor)
-    }
-
-    /// The farthest range, m, at which a target of `reflectance` is seen with probability `pd`; `None` where it is
-    /// seen at none. Near the sensor a target may be too bright for cells that count once.
-    pub fn farthest(&self, pd: f64, reflectance: f64) -> Option<f64> {
-        let scan = &self.design.scan;
-        // Nearer, a sampled channel is blind with the mark it has just sent.
-        let sampling = self.design.receiver.method.sampling();
-        let blank = sampling.map_or(0, |known| i64::from(known.blank_ticks) + 2);
-        let blind = range_from_tof(s_from_fs(blank * self.design.clock.tick_fs));
-        let (nearest, farthest) = (scan.min_range.max(0.1).max(blind), 20.0 * scan.max_range);
-        let lost = |range: f64| self.forecast(reflectance, range).pd < pd;
-        match bisect(nearest, farthest, lost) {
-            Some(range) if range <= nearest => {
-                let place = |place: i32| {
-                    nearest * libm::pow(farthest / nearest, f64::from(place) / f64::from(PLACES))
-                };
-                let last = (0..PLACES).rev().find(|at| !lost(place(*at)))?;
-                bisect(place(last), place(last + 1), lost)
-            }
-            found => Some(found.unwrap_or(farthest)),
-        }
-    }
 }
-
-/// Ranges that are tried for the farthest one at which a target is seen that is not seen at the nearest.
-const PLACES: i32 = 64;
 
 /// Brightnesses of an echo of `cells` speckle cells, M, in units of its mean, and the share of each. They
 /// follow the gamma distribution M^M·x^(M − 1)·exp(−M·x)/Γ(M).
@@ -550,113 +502,6 @@ fn brightnesses(cells: f64) -> Vec<(f64, f64)> {
         .collect();
     let all: f64 = each.iter().map(|(_, share)| share).sum();
     each.into_iter().map(|(brightness, share)| (brightness, share / all)).collect()
-}
-
-/// The first property of `design` or of its `operating` point without a closed form, and a way to get an
-/// answer all the same.
-fn not_modelled(design: &Design, operating: &Operating) -> Option<(String, String)> {
-    let method = &design.receiver.method;
-    if let (Method::Histogram(_), Detector::Geiger(geiger)) = (method, &design.detector) {
-        let interval_fs = design.emission.burst().map_or(i64::MAX, |burst| burst.interval_fs);
-        let what = if geiger.crosstalk > 0.0 {
-            "optical crosstalk between cells"
-        } else if geiger.dead_fs / interval_fs >= histogram::MOST_CYCLES {
-            "a dead time of many cycles"
-        } else {
-            return None;
-        };
-        return Some((what.to_owned(), "simulate it".to_owned()));
-    }
-    if let (Method::Phase(settings), Some(modulation)) = (method, design.emission.modulation()) {
-        let is_corrected = settings.tones.iter().all(|tone| tone.contrasts.len() > 1);
-        return (modulation.wave == Wave::Square && !is_corrected).then(|| {
-            let remedy = "simulate it, or leave out correct_harmonics";
-            ("harmonics that are not corrected".to_owned(), remedy.to_owned())
-        });
-    }
-    if let (Method::Beat(_), Some(chirp)) = (method, design.emission.chirp()) {
-        let what = "a frequency that strays from its ramps".to_owned();
-        return (chirp.error.amplitude > 0.0).then(|| (what, "simulate it".to_owned()));
-    }
-    if !matches!(method, Method::Direct | Method::Sampled(_)) && method.correlation().is_none() {
-        let what = format!("the receiver `{}`", method.kind().name());
-        let remedy = match method.kind().record() {
-            RecordKind::Ticks => "simulate it, or --set receiver.kind='\"matched\"'",
-            _ => "simulate it",
-        };
-        return Some((what, remedy.to_owned()));
-    }
-    if let Detector::Sampled(detector) = &design.detector {
-        if design.emission.coding().codebook.max_weight() > sampled::MOST_MARKS {
-            return Some((
-                "sampled words of more than 64 marks".to_owned(),
-                "simulate it, or take a code of fewer marks".to_owned(),
-            ));
-        }
-        return sunk(design, detector, operating.background);
-    }
-    let Detector::Linear(linear) = &design.detector else { return None };
-    let setting = linear.setting(operating.background);
-    let needed = setting.comparator?.apart(&setting, TOLD_APART * setting.threshold);
-    let codebook = &design.emission.coding().codebook;
-    let labels = 0..codebook.labels() as u16;
-    let sent = labels.flat_map(|label| (0..codebook.words() as u16).map(move |word| (label, word)));
-    let gaps = sent.filter_map(|(label, word)| {
-        codebook.marks(label, word).windows(2).map(|pair| pair[1] - pair[0]).min()
-    });
-    let least = s_from_fs(i64::from(gaps.min()?) * design.emission.coding().chip_fs);
-    let chip = s_from_fs(design.emission.coding().chip_fs);
-    (least < needed).then(|| {
-        (
-            "marks that merge behind the amplifier".to_owned(),
-            format!(
-                "marks of a word follow each other by {:.0} ps and are told apart from {:.0} ps on; \
-                 simulate it, or take a code with {:.0} chips from mark to mark, as a sparse one \
-                 with this `gap`",
-                least * 1e12,
-                needed * 1e12,
-                (needed / chip).ceil()
-            ),
-        )
-    })
-}
-
-/// Tells if the sensor's own marks pull the baseline of a sampled `detector` below the lowest code. Above
-/// that code, a receiver that knows the coupling adds the lost level to the samples again.
-fn sunk(design: &Design, detector: &Sampled, background: f64) -> Option<(String, String)> {
-    let deepest = sampled::deepest_baseline(design, detector);
-    let room = detector.below_zero();
-    let most = room - SEEN_BELOW * detector.rms_noise(background);
-    (deepest > most.max(0.0)).then(|| {
-        (
-            "a baseline that the sensor's own marks pull below the lowest code".to_owned(),
-            format!(
-                "they pull it down by {deepest:.0} photons, of {room:.0} that the converter tells; \
-                 simulate it, or take a lower `low_cutoff_khz`, more `isolation_db` or a shorter \
-                 `recovery_ns`"
-            ),
-        )
-    })
-}
-
-/// Standard deviations of the noise that must have room below the baseline.
-const SEEN_BELOW: f64 = 4.0;
-
-/// The least number from `low` to `high` for which `holds` is true, to a part in a million, if it is false
-/// below and true above; `None` if it is false even for `high`.
-fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
-    if holds(low) {
-        return Some(low);
-    }
-    if !holds(high) {
-        return None;
-    }
-    let (mut low, mut high) = (low, high);
-    while high / low > 1.0 + 1e-6 {
-        let middle = (low * high).sqrt();
-        if holds(middle) { high = middle } else { low = middle }
-    }
-    Some(high)
 }
 
 /// Time, s, from the opening of the range gate to an echo from `range` metres.
