@@ -28,7 +28,7 @@ pub(super) const FAMILIES: &[&str] = &[
 pub(super) enum FamilyFile {
     /// Prime sequence code over an odd prime p up to 251: p words of p² chips, p of them lit.
     Prime(u32),
-    /// The same in blocks of 2p − 1 chips, in which any two words share one mark at most; p up to 181.
+    /// The same in blocks of 2p − 1 chips: any two words share one mark at most; p up to 181.
     ExtendedPrime(u32),
     /// Quadratic congruence code over an odd prime p up to 251: p − 1 words of p² chips.
     QuadraticCongruence(u32),

@@ -229,7 +229,7 @@ mod tests {
         }
     }
 
-    /// Each fault is told in one sentence with its key.
+    /// Each fault gives one sentence with its key.
     #[test]
     fn impossible_modulations_are_refused() {
         for (key, value, told) in [

@@ -115,8 +115,8 @@ impl Model for Linear {
         self.sensitivity
     }
 
-    /// That of a mark that only just crosses the threshold: noise over the slope, τ·noise/threshold, with the
-    /// jitter of the input. It does not depend on how large the noise is.
+    /// Jitter of a mark that only just crosses the threshold: noise over the slope, τ·noise/threshold, with
+    /// the jitter of the input. It does not depend on how large the noise is.
     fn jitter(&self) -> f64 {
         let setting = self.setting(0.0);
         match setting.noise > 0.0 {

@@ -206,7 +206,7 @@ impl File {
 
     /// The low cutoff as an angular frequency, 1/s, of a converter with this number of `codes`.
     ///
-    /// A cutoff of a hundredth of the bandwidth at once takes 2 % away from the signal behind a mark. With
+    /// A cutoff of a hundredth of the bandwidth takes 2 % away from the signal right behind a mark. With
     /// more, the pulse would no longer be the one that the receiver knows. Nor does the receiver know a
     /// baseline that comes back within a sample.
     fn low_cutoff(

@@ -174,7 +174,7 @@ impl Model for Sampled {
         self.sensitivity
     }
 
-    /// That of a mark that is only just found by itself.
+    /// Jitter of a mark that is only just found by itself.
     fn jitter(&self) -> f64 {
         self.timing(FOUND * self.rms_noise(0.0).max(1.0), 0.0)
     }

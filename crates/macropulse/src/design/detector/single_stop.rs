@@ -197,8 +197,8 @@ impl Model for SingleStop {
         self.jitter
     }
 
-    /// That of the moment at which the m-th of k photons comes, about its mean. It is that of the m-th
-    /// smallest of k normal variables ([`normal_order`]), in rms lengths of a Gaussian pulse. It is averaged
+    /// Standard deviation of the moment at which the m-th of k photons comes. It is that of the m-th smallest
+    /// of k normal variables ([`normal_order`]), in rms lengths of a Gaussian pulse. Its square is averaged
     /// over pulses of m photons or more, whose numbers k are normal about the mean.
     fn mark_displacement(&self, lit: &Lit, light: &Light) -> f64 {
         let SingleStopSetting { needed, noise, .. } = self.setting(lit.background);
