@@ -20,7 +20,7 @@ const ORIGIN: &str = "standard input";
 /// The sensor called `name`, with single values changed.
 ///
 /// # Errors
-/// What is wrong with the name, the text or a change.
+/// If something is wrong with the name, the text or a change.
 pub fn design(name: &OsStr, changes: &[(String, String)]) -> Result<Design, Fault> {
     match name.to_str() {
         Some(STREAM) => Ok(Design::from_toml(stdin()?, ORIGIN, Path::new(""), changes)?),
@@ -34,7 +34,7 @@ pub fn design(name: &OsStr, changes: &[(String, String)]) -> Result<Design, Faul
 /// The scene called `name`, with single values changed, if there is `room` for its meshes.
 ///
 /// # Errors
-/// What is wrong with the name, the text or a change.
+/// If something is wrong with the name, the text or a change.
 pub fn scene(name: &OsStr, changes: &[(String, String)], room: Room) -> Result<Scene, Fault> {
     match name.to_str() {
         Some(STREAM) => {

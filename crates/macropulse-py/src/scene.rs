@@ -21,10 +21,10 @@ use crate::work;
 ///
 /// Args:
 ///     name_or_path: A ready one, as `macropulse.scenes()` lists them, or a TOML file.
-///     changes: Values that are changed: dotted keys of the scene file, in which an object is called
-///         by its name and a coordinate x, y or z, as `{"object.wall.position_m.x": 30}`;
-///         `{"environment": "fog-50m"}` for sun and air; `{"outside_files": True}` lets meshes name
-///         files outside the folder of the scene.
+///     changes: Changed values, by dotted keys of the scene file. An object is called by its name and a
+///         coordinate x, y or z, as `{"object.wall.position_m.x": 30}`. `{"environment": "fog-50m"}`
+///         changes sun and air. `{"outside_files": True}` lets meshes name files outside the folder of the
+///         scene.
 ///
 /// Raises:
 ///     Error: If a name, a key or a value is wrong; the sentence says where, and what to do.

@@ -201,7 +201,7 @@ impl Decoding {
     /// none.
     ///
     /// # Errors
-    /// What `watch` says; and [`Error::Invalid`], [`Error::Refused`], or [`Error::NoShot`] at the end.
+    /// The error of `watch`; and [`Error::Invalid`], [`Error::Refused`], or [`Error::NoShot`] at the end.
     pub fn next_scan<E: From<Error>>(
         &mut self,
         stage: (&Design, &Scale),

@@ -1,9 +1,9 @@
 //! Every number of [KP16] that can be checked by arithmetic: computed here, and found again in the
 //! row of the report that judges it.
 //!
-//! Correlations, error curves and payloads have laws of their own in `laws.rs`; Table 4 follows from
-//! angles in `table_4.rs`, its experiment is repeated in `clean_scan.rs`; `claims.rs` plants a number
-//! in every row.
+//! Correlations, error curves and payloads have laws of their own in `laws.rs`. Table 4 follows from
+//! angles in `table_4.rs`, and `clean_scan.rs` repeats its experiment. `claims.rs` plants a number in
+//! every row.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::f64::consts::PI;

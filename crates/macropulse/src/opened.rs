@@ -20,7 +20,7 @@ pub type Stream = Chain<Cursor<Vec<u8>>, File>;
 /// The file at `path`, which must be one and have `most` bytes at most.
 ///
 /// # Errors
-/// What the system says; or, in a sentence, that it is something else or too large.
+/// That of the system; or a sentence, if it is something else or too large.
 pub fn file(path: &Path, most: u64) -> io::Result<File> {
     let (file, about) = opened(path)?;
     if !about.is_file() {

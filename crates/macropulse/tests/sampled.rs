@@ -168,11 +168,11 @@ fn no_range_is_hidden_by_own_light() {
     assert!((pd(&nearer) - forecast).abs() < 0.02 && pd(&own) > 0.999);
 }
 
-/// In the open there are no more points than the receiver is asked for, 3e-5 a shot; N = 13 568, seed 6, α =
+/// In the open there are no more points than the receiver is asked for, 3e-5 a shot: N = 13 568, seed 6, α =
 /// 1e-3 of 3 of a mean of 0.4. With a wall of 10 % beyond the gate there are no more than the design accepts,
-/// 1e-4: what of its light is not found lies beside noise; N = 54 272, seeds 6 to 9, α = 1e-3 of 14 of a mean
-/// of 5.4. By other seeds, 12 of 203 520 had a point. Control: a threshold for one in a hundred shots is
-/// crossed.
+/// 1e-4, as the light of the wall that is not found lies beside noise. Here N = 54 272, seeds 6 to 9, α = 1e-3
+/// of 14 of a mean of 5.4. By other seeds, 12 of 203 520 had a point. Control: a threshold for one in a hundred
+/// shots is crossed.
 #[test]
 fn there_are_no_more_points_of_nothing_than_accepted() {
     let nothing = |design: &Design, range: f64, seed: u64| {

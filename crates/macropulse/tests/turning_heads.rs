@@ -62,8 +62,8 @@ fn the_vlp_16_fires_when_and_where_its_manual_says() {
                 let fired = log.fired_at_fs[shot] as f64 * 1e-15 - scan as f64 * 0.1;
                 // Shots wait for the chip clock, a tick of 13.342 ps here.
                 assert!((-1e-15..13.4e-12).contains(&(seconds - fired)), "{seconds} {fired}");
-                // The manual: α clockwise from its y axis, X = R cos ω sin α, Y = R cos ω cos α,
-                // Z = R sin ω + correction; Y looks forward, X to the right, and we begin behind.
+                // The manual has α clockwise from its y axis. X = R cos ω sin α looks to the right,
+                // Y = R cos ω cos α forward, and Z = R sin ω + correction up. We begin behind.
                 let (alpha, omega) = (PI + TAU * seconds / 0.1, degrees.to_radians());
                 let theirs = [omega.cos() * alpha.sin(), omega.cos() * alpha.cos(), omega.sin()];
                 let ours = design.directions().of_shot(&log, shot);

@@ -56,7 +56,7 @@ impl Desk {
     /// Runs `commands` and gives all that they print.
     ///
     /// # Errors
-    /// What they printed, and the command that failed.
+    /// The command that failed, and the output.
     pub fn run(&self, commands: &str) -> Result<String, String> {
         self.bash(&format!("exec 2>&1\n{commands}"))
     }
@@ -72,7 +72,7 @@ impl Desk {
     /// That every `macropulse` at the beginning of one of `commands` knows its options. A variable stands for its name.
     ///
     /// # Errors
-    /// What it said.
+    /// The message about it.
     pub fn parse(&self, commands: &str) -> Result<(), String> {
         let whole = commands.replace("\\\n", " ");
         let ours = whole.lines().map(|line| line.trim_start().trim_start_matches("$ "));

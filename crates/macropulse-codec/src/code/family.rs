@@ -100,7 +100,7 @@ impl Family {
     /// The prime sequence code over GF(`p`).
     ///
     /// # Errors
-    /// Where `p` is not an odd prime, or greater than 251.
+    /// If `p` is not an odd prime, or greater than 251.
     pub fn prime(p: u32) -> Result<Self, Error> {
         prime::checked(p, prime::LARGEST, "a prime code").map(|p| Self::Prime { p })
     }
@@ -108,7 +108,7 @@ impl Family {
     /// The extended prime code over GF(`p`), of length p·(2p − 1).
     ///
     /// # Errors
-    /// Where `p` is not an odd prime, or greater than 181.
+    /// If `p` is not an odd prime, or greater than 181.
     pub fn extended_prime(p: u32) -> Result<Self, Error> {
         prime::checked(p, prime::LARGEST_EXTENDED, "an extended prime code")
             .map(|p| Self::ExtendedPrime { p })
@@ -117,7 +117,7 @@ impl Family {
     /// The quadratic congruence code over GF(`p`).
     ///
     /// # Errors
-    /// Where `p` is not an odd prime, or greater than 251.
+    /// If `p` is not an odd prime, or greater than 251.
     pub fn quadratic_congruence(p: u32) -> Result<Self, Error> {
         prime::checked(p, prime::LARGEST, "a quadratic congruence code")
             .map(|p| Self::QuadraticCongruence { p })
@@ -126,7 +126,7 @@ impl Family {
     /// The extended quadratic congruence code over GF(`p`), of length p·(2p − 1).
     ///
     /// # Errors
-    /// Where `p` is not an odd prime, or greater than 181.
+    /// If `p` is not an odd prime, or greater than 181.
     pub fn extended_quadratic_congruence(p: u32) -> Result<Self, Error> {
         prime::checked(p, prime::LARGEST_EXTENDED, "an extended quadratic congruence code")
             .map(|p| Self::ExtendedQuadraticCongruence { p })
@@ -177,7 +177,7 @@ impl Family {
     /// The m-sequence of `degree`. It is one word: its shifts cannot be told from delay.
     ///
     /// # Errors
-    /// Where `degree` is not 3 to 15.
+    /// If `degree` is not 3 to 15.
     pub fn m_sequence(degree: u32) -> Result<Self, Error> {
         shift_register::checked_degree(degree).map(|degree| Self::MSequence { degree })
     }
@@ -185,7 +185,7 @@ impl Family {
     /// The Gold code of `degree`.
     ///
     /// # Errors
-    /// Where `degree` is not 5, 6, 7, 9, 10 or 11.
+    /// If `degree` is not 5, 6, 7, 9, 10 or 11.
     pub fn gold(degree: u32) -> Result<Self, Error> {
         shift_register::checked_gold_degree(degree).map(|degree| Self::Gold { degree })
     }

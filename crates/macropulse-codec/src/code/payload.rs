@@ -134,7 +134,7 @@ impl Payload {
     /// The label that `payload` carries; bits above [`bits`](Self::bits) are ignored.
     ///
     /// # Errors
-    /// What is wrong with it, where it is none.
+    /// The fault of a payload that is none.
     pub fn check(&self, payload: u32) -> Result<u16, PayloadFault> {
         let payload = payload & ((1 << self.bits()) - 1);
         if self.sync && payload >> self.checked_bits() == 0 {

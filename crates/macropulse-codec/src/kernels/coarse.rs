@@ -10,7 +10,7 @@ pub(crate) const COARSE: usize = 8;
 /// is lit. Bits beyond the end are dark.
 ///
 /// # Panics
-/// Where `shift` is 64 or more.
+/// If `shift` is 64 or more.
 pub(crate) fn coarse(words: &[u64], shift: usize, picture: &mut [u64]) {
     assert!(shift < 64);
     // A picture word is made of eight words, and the beginning of the next one.

@@ -11,7 +11,7 @@ const MANY: usize = PLANES - LOW;
 pub(super) type Counter = unsafe fn(&[u64], u32, &[u32], &mut [u64]);
 
 /// Returns the function that counts in blocks of `W` machine words on this level, into this number of
-/// `planes`; `None` if the level has no registers as long as the shorter block.
+/// `planes`. `None` if the level has no registers as long as the shorter block.
 ///
 /// # Safety
 ///

@@ -133,7 +133,7 @@ impl Place {
 /// Tries the forecasts of the ready `sensor` by night, at 70 % of its range.
 ///
 /// # Errors
-/// Where the sensor cannot be simulated there.
+/// If the sensor cannot be simulated there.
 pub fn places(sensor: &str, seed: u64, watch: &Watch) -> Result<Vec<Place>, Error> {
     let ready = Design::open(sensor, &[])?;
     let design = match ready.receiver.method {

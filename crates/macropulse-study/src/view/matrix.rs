@@ -22,7 +22,7 @@ impl MatrixPicture<'_> {
     /// The picture as an 8-bit RGB PNG: the highest value warm, 0 cool, with a key.
     ///
     /// # Errors
-    /// Where there is no cell, or not one value for each.
+    /// If there is no cell, or not one value for each.
     pub fn png(&self) -> Result<Vec<u8>, Error> {
         if self.values.len() != self.side * self.side {
             let (side, found) = (self.side, self.values.len());

@@ -160,7 +160,7 @@ impl<'a> View<'a> {
     }
 
     /// The pixel of the shot whose axis is nearest to `direction`, of a pattern whose field of view follows the
-    /// beam: a cone about the axis, with the solid angle of a cell.
+    /// beam. The field is a cone about the axis, with the solid angle of a cell.
     fn nearest(&self, direction: [f64; 3], arrives_fs: i64) -> Option<(u16, u16)> {
         let fired_at_fs = &self.log.fired_at_fs;
         let first = fired_at_fs.partition_point(|fired_fs| {

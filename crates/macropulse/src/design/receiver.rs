@@ -60,8 +60,8 @@ pub(super) struct ReceiverFile {
     /// Standard deviation of the shape of a pulse, as a share of its height (histogram); 0 if it is not given.
     #[schemars(range(min = 0, max = 1))]
     shape_error: Option<f64>,
-    /// A return with less than this share of the photons of the strongest one is not given (histogram), or a peak of
-    /// the power (beat); 0 if it is not given.
+    /// Least share of the photons (histogram) or of the power (beat) of the strongest return that another
+    /// return must have. Left out: 0.
     #[schemars(range(min = 0, max = 1))]
     least_share: Option<f64>,
     /// True if the phase error made by harmonics of the modulation is corrected (phase). True if it is not

@@ -97,7 +97,7 @@ impl About {
     /// Takes in a line of text. Lines that say nothing of this kind are passed over.
     ///
     /// # Errors
-    /// What is wrong with a line that begins like one of ours.
+    /// The fault of a line that begins like one of ours.
     pub fn take(&mut self, line: &str) -> Result<(), String> {
         if let Some(scan) = line.strip_prefix(SCAN) {
             self.scan = scan.trim().parse().unwrap_or(0);

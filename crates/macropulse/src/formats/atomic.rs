@@ -185,7 +185,7 @@ pub(super) fn growing_named(path: &Path) -> io::Result<File> {
 /// Proves that a file can be made in `folder`, and leaves none.
 ///
 /// # Errors
-/// What the system says.
+/// That of the system.
 pub fn prove_writable(folder: &Path) -> io::Result<()> {
     locked(named(folder)).map(drop)
 }

@@ -166,7 +166,7 @@ pub(super) type Next<'a> = &'a mut dyn FnMut(&mut [u8]) -> Result<bool, String>;
 /// The cloud of a list of `points` records, which `next` gives.
 ///
 /// # Errors
-/// What is wrong with the records, or that there are too few.
+/// If something is wrong with the records, or there are too few.
 pub(super) fn list(
     about: &mut About,
     layout: &Layout,
@@ -188,7 +188,7 @@ pub(super) fn list(
 /// without x, y and z is a pixel that had no return.
 ///
 /// # Errors
-/// What is wrong with the records, or that there are too few.
+/// If something is wrong with the records, or there are too few.
 pub(super) fn image(
     about: &mut About,
     layout: &Layout,

@@ -73,8 +73,8 @@ impl Scale {
     }
 
     /// Reflectance of a surface square on at `range` metres that brings `photons` per mark, up to
-    /// [`BRIGHTEST`]; 1 for a detector that never misses and so has no photon scale; 0 where the
-    /// return lies at the sensor, which any surface would outshine.
+    /// [`BRIGHTEST`]. It is 1 for a detector that never misses and so has no photon scale. It is 0 if the
+    /// return lies at the sensor, as any surface there would be brighter.
     #[inline]
     pub(super) fn reflectance(&self, photons: f32, range: f64) -> f32 {
         let white = self.link.detected(1.0, range);

@@ -44,7 +44,7 @@ impl MultipleAccess {
     /// `users` of the prime code over GF(`p`).
     ///
     /// # Errors
-    /// Where there is no such code: see [`Family::prime`].
+    /// If there is no such code: see [`Family::prime`].
     pub fn prime(p: u32, users: u32, words: Words) -> Result<Self, Error> {
         Ok(Self::new(Family::prime(p)?.weight(), users, Hits::prime(p, words)))
     }

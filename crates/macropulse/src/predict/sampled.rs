@@ -298,7 +298,7 @@ impl Axes {
 }
 
 /// The deepest point below zero to which the sensor's own marks pull the baseline of an amplifier coupled by
-/// a capacitor, in detected photons; 0 if light does not move it.
+/// a capacitor, in detected photons. 0 if light does not move it.
 ///
 /// Behind each mark it lies ω·Q lower, Q its [charge](Sampled::charge) after it was clipped, and comes back
 /// with exp(−ω·t). The words follow each other along a line for as long as the baseline remembers.

@@ -229,7 +229,7 @@ fn converters(design: &Design, forecast: &Forecast) -> Check {
 }
 
 /// Checks that the receiver separates chips, or marks behind the detector, on a surface at `range` metres
-/// that is slanted by 45°; `None` for a beam that is a line, and for light without pulses.
+/// that is slanted by 45°. `None` for a beam that is a line, and for light without pulses.
 pub fn slant(design: &Design, range: f64) -> Option<Check> {
     if design.light.divergence == 0.0 || !design.emission.is_pulsed() {
         return None;

@@ -38,7 +38,7 @@ pub struct HistogramMethod {
     /// False returns accepted per histogram.
     pub false_alarm: f64,
     /// Standard deviation of the shape of the pulse in each bin, as a share of its height there or in a
-    /// bin beside it, whichever is higher; 0 if light has exactly this shape. A surface that is tilted or
+    /// bin beside it, whichever is higher. 0 if light has exactly this shape. A surface that is tilted or
     /// moves stretches a pulse.
     pub shape_error: f64,
     /// A return with less than this share of the photons of the strongest one of its histogram is not
@@ -90,8 +90,8 @@ impl HistogramReceiver {
 /// The returns of the owned shots of `log`, histogram `i` being that of shot `i`; ordered by shot, those
 /// of one shot by range.
 ///
-/// `photons` of a return are all the signal photons of its pulse, freed of pile-up if that is corrected;
-/// `margin` is the significance beyond the threshold, in standard deviations of a normal variable;
+/// `photons` of a return are all the signal photons of its pulse, freed of pile-up if that is corrected.
+/// `margin` is the significance beyond the threshold, in standard deviations of a normal variable.
 /// `saturated` says that every laser pulse had been counted before the histogram ended.
 ///
 /// # Errors

@@ -185,9 +185,9 @@ fn alone<'a>(
 }
 
 impl PixelExplanation {
-    /// Explains shot number `shot` of a band out of its record. `arrivals` gives the light
-    /// of a stretch of time, from the shot, or where its gate opens, to the end of the last
-    /// macropulse within the gate; `None` where it is not known.
+    /// Explains shot number `shot` of a band out of its record. `arrivals` gives the light of a stretch of time,
+    /// or `None` if the light is not known. The stretch begins with the shot or its gate, and lasts to the end
+    /// of the last macropulse within the gate.
     ///
     /// # Errors
     /// As the receiver's.

@@ -126,9 +126,8 @@ kinds! {
 }
 
 impl Detector {
-    /// The rms length, s, over which the photons of a micropulse of `light` are spread where it sees each by
-    /// itself; `None` where they are taken to come at once, and for a photodiode, which sees the pulse as a
-    /// whole.
+    /// The rms length, s, over which the photons of a micropulse of `light` are spread if it sees each by
+    /// itself. `None` if they are taken to come at once, and for a photodiode, which sees the pulse as a whole.
     pub fn spread_of(&self, light: &Light) -> Option<f64> {
         light.spread.filter(|_| !matches!(self, Self::Linear(_) | Self::Sampled(_)))
     }
@@ -232,8 +231,8 @@ pub trait Model {
         0
     }
 
-    /// For how long before what is asked of it all light must be known, fs, until what it puts out hangs on
-    /// none before; 0 where each moment stands for itself.
+    /// Time, fs, after which its output no longer depends on earlier light. 0 if each moment stands for
+    /// itself.
     fn settles_fs(&self) -> i64 {
         0
     }

@@ -275,9 +275,8 @@ impl<'a> Source<'a> {
     }
 
     /// Autoware's number of the type of a return. 0: invalid. If shots have one return at most, 2 for a
-    /// sensor that picks the last return, else 1. If a shot may have several, 7 for the only one of its shot;
-    /// 3 for the first one and 4 for a later one if it is the strongest; otherwise 5 for the first one and 6
-    /// for a later one.
+    /// sensor that picks the last return, else 1. If a shot may have several, 7 for the only one of its shot.
+    /// The strongest is 3 if it is the first one, else 4. Another one is 5 if it is the first one, else 6.
     fn return_type(&self, point: Point) -> u8 {
         let Point::Return(at) = point else { return 0 };
         let Some(strongest) = &self.strongest else {

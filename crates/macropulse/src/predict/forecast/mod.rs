@@ -107,7 +107,7 @@ pub struct Forecast {
     /// none, fewer than one in a million.
     pub precision: Option<f64>,
     /// Returns that lie on a sidelobe of their own macropulse, where neighbours tell which of several as
-    /// high ones is the peak; `None` without a matched receiver, and where there is no precision.
+    /// high ones is the peak. `None` without a matched receiver, and where there is no precision.
     pub aside: Option<Aside>,
     /// The least deviation of any unbiased estimate from the same number of photons, m: c/2·σ/√n, σ the rms
     /// length of a micropulse with the jitter.

@@ -52,7 +52,7 @@ impl Forecaster<'_> {
 }
 
 /// The least number from `low` to `high` for which `holds` is true, to a part in a million, if it is false
-/// below and true above; `None` if it is false even for `high`.
+/// below and true above. `None` if it is false even for `high`.
 fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
     if holds(low) {
         return Some(low);
