@@ -43,10 +43,8 @@ pages! {
         physics: "docs/physics.md",
         references: "docs/references.md",
         validation: "docs/validation.md",
-        bipolar_gold: "docs/guide/bipolar-gold.md",
         budget: "docs/guide/budget.md",
         cluster: "docs/guide/cluster.md",
-        coded_360: "docs/guide/coded-360.md",
         explore: "docs/guide/explore.md",
         first_scan: "docs/guide/first-scan.md",
         golden_model: "docs/guide/golden-model.md",
@@ -54,18 +52,20 @@ pages! {
         modulated_light: "docs/guide/modulated-light.md",
         range_and_velocity: "docs/guide/range-and-velocity.md",
         three_methods: "docs/guide/three-methods.md",
-        own_code: "docs/guide/own-code.md",
         own_scanner: "docs/guide/own-scanner.md",
         python: "docs/guide/python.md",
         real_chip: "docs/guide/real-chip.md",
         ros: "docs/guide/ros.md",
-        sweep: "docs/guide/sweep.md",
     }
     slow {
+        bipolar_gold: "docs/guide/bipolar-gold.md",
         coded_32: "docs/guide/coded-32.md",
+        coded_360: "docs/guide/coded-360.md",
         coded_practical: "docs/guide/coded-practical.md",
         interference: "docs/guide/interference.md",
         never_waiting: "docs/guide/never-waiting.md",
+        own_code: "docs/guide/own-code.md",
+        sweep: "docs/guide/sweep.md",
     }
 }
 
