@@ -50,12 +50,9 @@ pages! {
         golden_model: "docs/guide/golden-model.md",
         histograms: "docs/guide/histograms.md",
         modulated_light: "docs/guide/modulated-light.md",
-        range_and_velocity: "docs/guide/range-and-velocity.md",
-        three_methods: "docs/guide/three-methods.md",
         own_scanner: "docs/guide/own-scanner.md",
         python: "docs/guide/python.md",
         real_chip: "docs/guide/real-chip.md",
-        ros: "docs/guide/ros.md",
     }
     slow {
         bipolar_gold: "docs/guide/bipolar-gold.md",
@@ -65,7 +62,10 @@ pages! {
         interference: "docs/guide/interference.md",
         never_waiting: "docs/guide/never-waiting.md",
         own_code: "docs/guide/own-code.md",
+        range_and_velocity: "docs/guide/range-and-velocity.md",
+        ros: "docs/guide/ros.md",
         sweep: "docs/guide/sweep.md",
+        three_methods: "docs/guide/three-methods.md",
     }
 }
 
