@@ -69,14 +69,14 @@ impl Class1 {
             (_, t) if t > LONGEST => self.continuous() * t,
             (Self::Retina { .. }, t) if t < 1e-11 => 3.8e-8,
             (Self::Retina { c4 }, t) if t <= self.counted_as_one() => 7.7e-8 * c4,
-            (Self::Retina { c4 }, t) => 7e-4 * power_3_4(t) * c4,
+            (Self::Retina { c4 }, t) => 7e-4 * libm::pow(t, 0.75) * c4,
             (Self::Lens, t) if t < 1e-9 => 8e5 * t,
             (Self::Lens, t) if t <= 1e-3 => 8e-4,
-            (Self::Lens, t) if t <= 0.35 => 4.4e-3 * power_1_4(t),
+            (Self::Lens, t) if t <= 0.35 => 4.4e-3 * libm::pow(t, 0.25),
             (Self::Lens, t) => 1e-2 * t,
             (Self::Cornea, t) if t < 1e-9 => 8e6 * t,
             (Self::Cornea, t) if t <= 0.35 => 8e-3,
-            (Self::Cornea, t) => 1.8e-2 * power_3_4(t),
+            (Self::Cornea, t) => 1.8e-2 * libm::pow(t, 0.75),
         }
     }
 
@@ -132,21 +132,10 @@ impl Class1 {
     /// C5 = 1 for N ≤ 600 groups within 10 s, else max(5·N^−0.25, 0.4); for the retina alone.
     pub(super) fn c5(&self, groups: f64) -> f64 {
         match self {
-            Self::Retina { .. } if groups > 600.0 => (5.0 / power_1_4(groups)).max(0.4),
+            Self::Retina { .. } if groups > 600.0 => (5.0 * libm::pow(groups, -0.25)).max(0.4),
             _ => 1.0,
         }
     }
-}
-
-/// x^(1/4), by square roots, which take a fifth of the time of a power.
-fn power_1_4(x: f64) -> f64 {
-    libm::sqrt(libm::sqrt(x))
-}
-
-/// x^(3/4), likewise.
-fn power_3_4(x: f64) -> f64 {
-    let root = libm::sqrt(x);
-    root * libm::sqrt(root)
 }
 
 #[cfg(test)]
