@@ -1,4 +1,4 @@
-//! Least cost of decoding: an experiment beside the receiver that is told where all light comes from.
+//! Least cost of decoding: an experiment beside the receiver, with the true source of all light.
 //!
 //! In noise every tick is laid down as a bit, twice, to keep what is explained apart from what was seen. The
 //! marks of each echo are counted at 256 lags about its range, and put out. The range is taken from the

@@ -249,7 +249,7 @@ fn run_replaces_its_own_files_and_none_of_a_user() {
         let words = [name, "not known to be written by macropulse", "another folder"];
         desk.refused("simulate peregrine wall --format npy,pcd -o mine", &words);
         assert_eq!(fs::read_to_string(folder.join(name)).unwrap(), text);
-        // A file that this run does not write is in nobody's way.
+        // A run leaves files alone that it does not write.
         desk.put("mine/scan-000007.pcd", "mine");
         fs::remove_file(folder.join(name)).unwrap();
         assert_eq!(desk.run("simulate peregrine wall --format pcd -o mine").code, Some(0));

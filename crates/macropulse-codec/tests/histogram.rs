@@ -218,9 +218,9 @@ fn bias_is_below_a_tenth_of_a_bin() {
 }
 
 /// Returns from background alone: no more than 2 % of N = 6000 histograms, seed 5, have one (α = 10⁻³: 120
-/// expected, 155 at most), and no fewer than a tenth of that. At 0.01 counts a bin they are rarer: three
-/// counts must come together, as two would be too frequent. The control takes the matched filter for normal,
-/// and finds several times more in histograms with few counts.
+/// expected, 155 at most), and no fewer than a tenth of that. At 0.01 counts a bin they are rarer: a return
+/// needs three counts at once, as two coincide too often. The control assumes that noise behind the matched
+/// filter is normal. It finds several times more in histograms with few counts.
 #[test]
 fn false_returns_are_as_rare_as_stated() {
     const ALL: usize = 6000;

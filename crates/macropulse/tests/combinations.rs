@@ -200,7 +200,7 @@ fn every_combination_is_what_the_table_says() {
 /// code they come at least a third as often. A thorough receiver believes bare short words less often than is
 /// forecast if shots are so far apart that each is judged before those behind it. And no pixel is found more
 /// often alone, in a flash, than with neighbours that tell where to look. N = 2048 shots, seed 1: a share is
-/// known to 0.011, and three of those are granted. Control: four times the light is told from it.
+/// known to 0.011, and may be off by three times that. Control: four times the light is farther off.
 #[test]
 fn the_forecast_holds_for_every_combination() {
     let day = Environment::named("clear-day").unwrap();

@@ -178,8 +178,8 @@ fn marks_are_not_all_there_is_where_anything_else_is() {
     assert!(photons(&complement, f64::INFINITY).is_none());
 }
 
-/// The echoes of a shot are told apart by a number of 16 bits. Its light takes one number for each slice of a
-/// micropulse. Echoes beyond that are detected all the same.
+/// Each echo of a shot has a number of 16 bits, and its light takes one number for each slice of a micropulse.
+/// Echoes beyond the last number are detected all the same.
 #[test]
 fn a_shot_may_have_echoes_without_number() {
     // Its micropulses are followed in 13 slices, so that 5042 echoes are too many to be told apart.

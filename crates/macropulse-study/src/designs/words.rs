@@ -112,8 +112,9 @@ impl Requirements {
         Ok(Candidate { words: Some(words), ..candidate.clone() })
     }
 
-    /// Shots of `design` that are lost to own light, if it sent these `words` in turn; `None` if more than `limit`
-    /// are lost at some range. The limit falls while other words are tried: words above it are not the best.
+    /// Returns the shots of `design` that are lost to own stray light, if it sent these `words` in turn. `None`
+    /// if more than `limit` are lost at some range. The limit falls while other words are tried: words above it
+    /// are not the best.
     fn lost(&self, design: &Design, words: &[CodeWord], limit: &AtomicUsize) -> Option<Lost> {
         let sampling = design.receiver.method.sampling();
         let none = Lost { at_worst: 0, in_all: 0 };

@@ -113,7 +113,7 @@ fn pulses_of(other: &Mount<'_>) -> (u64, f64) {
 struct View<'a> {
     design: &'a Design,
     log: &'a ShotLog,
-    /// Light is received that begins this long before a detector stops to listen, or ends this long after it starts, fs.
+    /// Times, fs, by which light begins before its first chip and ends after it.
     around_fs: (i64, i64),
     /// Squared chord of the unit sphere to the edge of a field about its axis.
     edge: f64,

@@ -8,9 +8,9 @@
 //! 5. Between marks, noise crosses the threshold at the rate the threshold was set for.
 //!
 //! This model applies if the list `idealised` names `inter-chip`. Light of one shot that comes within the
-//! response of the amplifier adds up; light of several shots does not. Marks of one word that follow each
-//! other sooner are told apart. The walk of the crossing with the amplitude counts as calibrated out. Else
-//! [`super::waveform`] applies (docs/physics.md#photodiode-and-comparator).
+//! response of the amplifier adds up; light of several shots does not. Marks of one word are separate events
+//! even if they follow each other sooner than that. The walk of the crossing with the amplitude is taken to be
+//! calibrated out. Otherwise [`super::waveform`] applies (docs/physics.md#photodiode-and-comparator).
 
 use rand_distr::{Distribution, Poisson, StandardNormal};
 

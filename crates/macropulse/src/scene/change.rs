@@ -104,8 +104,8 @@ pub const OF_SCENE: &str = "scene:";
 /// The table of sun and air.
 const ENVIRONMENT: &str = "environment";
 
-/// Splits `changes` into those of a scene, which are the keys behind `scene:` and those of its environment,
-/// and those of a sensor.
+/// Splits `changes` into those of a scene and those of a sensor. Keys behind `scene:` and keys of the
+/// environment belong to the scene.
 pub fn apart(changes: &[(String, String)]) -> Changes {
     let mut apart = Changes::default();
     for (key, value) in changes {

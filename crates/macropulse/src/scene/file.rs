@@ -382,7 +382,7 @@ pub(super) struct Source<'a> {
     pub place: Place,
 }
 
-/// Kind of place that is told of a fault.
+/// Form in which a message names the place of a fault.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Place {
     /// Line and column, of a text that people have typed.

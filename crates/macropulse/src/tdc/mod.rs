@@ -23,7 +23,7 @@ use crate::detect::{Detections, Response};
 pub struct Converted {
     /// Ticks that the receiver is given.
     pub ticks: Ticks,
-    /// Ticks that were made, including those that nobody wanted.
+    /// Number of ticks made, including those that the receiver is not given.
     pub made: u64,
     /// Most converters busy at once, in any one channel; no less than was known before.
     pub peak_busy: u32,

@@ -344,7 +344,7 @@ impl<'a> Sent<'a> {
 
     /// Returns the lags at which light is looked for: those of the gate, and all beyond it from which light
     /// may come, a macropulse farther at least. Light from beyond has sidelobes within the gate, and lights
-    /// marks of later shots. Once known, it is told from returns.
+    /// marks of later shots. Once found, it is not mistaken for returns.
     pub fn reach(&self) -> Range<i64> {
         self.reach.clone()
     }
