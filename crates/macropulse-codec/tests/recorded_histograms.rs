@@ -1,9 +1,7 @@
 //! The receiver of histograms against a sensor that exists: histograms of a TMF8820, with its emitted
-//! pulse and the distances that the chip works out of them. Runs where `MACROPULSE_RECORDED` names the
-//! folder that holds `tmf8820/`; says that it was not tested elsewhere.
+//! pulse and the distances that the chip works out of them. Runs where the recordings are; says that it was not
+//! tested elsewhere.
 #![allow(clippy::unwrap_used)]
-
-use std::path::PathBuf;
 
 use macropulse_codec::decode::Returns;
 use macropulse_codec::decode::histogram::{
@@ -38,13 +36,7 @@ fn numbers(value: &Value) -> Vec<u64> {
 
 impl Recording {
     fn open(name: &str) -> Option<Self> {
-        let folder = std::env::var_os("MACROPULSE_RECORDED").map(PathBuf::from);
-        let Some(folder) = folder.map(|folder| folder.join("tmf8820")) else {
-            eprintln!(
-                "NOT TESTED: histograms of a sensor; MACROPULSE_RECORDED does not name their folder"
-            );
-            return None;
-        };
+        let folder = macropulse_testbed::data_of_others("recorded/tmf8820")?;
         let text = std::fs::read_to_string(folder.join(name)).unwrap();
         let captures: Vec<Value> = serde_json::from_str(&text).unwrap();
         let mut emitted = vec![0; BINS];

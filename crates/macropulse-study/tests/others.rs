@@ -31,11 +31,7 @@ fn example(name: &str, folder: &str) -> Option<Scene> {
 /// The same, its text changed.
 fn changed(name: &str, folder: &str, change: fn(String) -> String) -> Option<Scene> {
     let text = change(fs::read_to_string(here("../../docs/examples").join(name)).unwrap());
-    let base = here("../../../shared/data/meshes").join(folder);
-    if !base.is_dir() {
-        println!("skipped: {} is not there", base.display());
-        return None;
-    }
+    let base = macropulse_testbed::data_of_others(&format!("meshes/{folder}"))?;
     Some(Scene::from_toml(&text, name, &base).unwrap())
 }
 
@@ -180,8 +176,8 @@ fn a_toy_truck_is_made_6_m_long_and_turned() {
 
 /// The corners of a PLY mesh of the street.
 fn corners(name: &str) -> Vec<Point> {
-    let folder = here("../../../shared/data/meshes/street-canyon-with-cars/meshes");
-    let mut file = fs::File::open(folder.join(format!("{name}.ply"))).unwrap();
+    let path = format!("meshes/street-canyon-with-cars/meshes/{name}.ply");
+    let mut file = fs::File::open(macropulse_testbed::data_of_others(&path).unwrap()).unwrap();
     let ply = Parser::<DefaultElement>::new().read_ply(&mut file).unwrap();
     let coordinate = |vertex: &DefaultElement, axis: &str| match vertex[axis] {
         Property::Float(value) => f64::from(value),

@@ -121,6 +121,20 @@ pub fn sources_below(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// A file or folder of the recordings and meshes of others, which are not part of the repository. They lie in the
+/// folder that the variable `MACROPULSE_DATA` names, or in `shared/data` beside the repository. `None` if it is not
+/// there: this is printed.
+pub fn data_of_others(path: &str) -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let folder = std::env::var_os("MACROPULSE_DATA").map_or_else(beside, PathBuf::from);
+    let path = folder.join(path);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("NOT TESTED: {} is not there", path.display());
+    None
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {

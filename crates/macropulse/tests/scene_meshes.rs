@@ -4,7 +4,7 @@
 use crate::tetra;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use macropulse::scene::{Ray, Scene};
 use tetra::{MTL, OBJ, folder, object, range_along_x, refusal};
@@ -223,14 +223,9 @@ fn broken_meshes_are_refused_with_what_to_do() {
     }
 }
 
-/// A mesh of the shared collection; `None`, with a sentence, where that is absent.
+/// A mesh made by others; `None`, with a sentence, where it is absent.
 fn shared(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/meshes").join(name);
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
+    macropulse_testbed::data_of_others(&format!("meshes/{name}"))
 }
 
 #[test]

@@ -295,15 +295,12 @@ fn the_metadata_of_an_ouster_sensor_are_a_head() {
     // Its beam points 3 degrees to the right of that of the last laser.
     let apart = (y.atan2(x) - ahead.atan2(three.directions().of(2, 0)[0])).to_degrees();
     assert!((apart.abs() - 3.0).abs() < 0.4, "{apart}");
-    let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/recorded/ouster");
-    match std::fs::read_to_string(format!("{shared}/OS-1-128_v2.3.0_1024x10.json")) {
-        Ok(json) => {
-            let design = head(&json);
-            assert_eq!(design.scan.rows, 128);
-            let top = design.directions().of(0, 0)[2].asin().to_degrees();
-            assert!((top - 20.95).abs() < 1e-9, "{top}");
-        }
-        Err(_) => eprintln!("NOT TESTED: no metadata of a sensor in ../shared/data"),
+    let metadata = "recorded/ouster/OS-1-128_v2.3.0_1024x10.json";
+    if let Some(metadata) = macropulse_testbed::data_of_others(metadata) {
+        let design = head(&std::fs::read_to_string(metadata).unwrap());
+        assert_eq!(design.scan.rows, 128);
+        let top = design.directions().of(0, 0)[2].asin().to_degrees();
+        assert!((top - 20.95).abs() < 1e-9, "{top}");
     }
 }
 
