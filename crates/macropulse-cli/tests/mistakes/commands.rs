@@ -43,7 +43,7 @@ const OPTIONS: &[Row] = &[
     ("--environment fog", &["did you mean `fog-50m`?"]),
     ("--set environment.visibility_km=0", &["between 0.01 and 1000"]),
     ("--without sunlight", &["`sunlight` is no effect", "background"]),
-    ("--with footprint", &["7 or 19 rays"]),
+    ("--with footprint", &["9 or 25 rays"]),
     ("--with background --without background", &["leave one out"]),
     ("--explain 1", &["--explain", "row,column"]),
     ("extra", &["'extra'", "the folder for the results is named with -o"]),

@@ -41,7 +41,7 @@ const ROWS: &[Row] = &[
     ("[light]\nwavelength_um = 0.9", &["mine.toml:5:1:", "did you mean `wavelength_nm`?"]),
     ("[light]\nenergy = 100", &["mine.toml:5:1:", "\"class-1\" or { shot_nj = … }"]),
     ("[light]\nenergy = \"class1\"", &["mine.toml:5:1:", "did you mean `class-1`?"]),
-    ("[light]\nfootprint_rays = 5", &["mine.toml:5:1:", "1, 7 or 19"]),
+    ("[light]\nfootprint_rays = 5", &["mine.toml:5:1:", "1, 9 or 25 of a flash"]),
     ("[detector]\nkind = \"geiger\"", &["mine.toml:5:1:", "`kind`", "receiver"]),
     ("[detector.spad]\ncells = 4", &["mine.toml:4:11:", "`spad`", "photon-counting, geiger"]),
     ("[detector.single-stop]\njitter_ps = -5", &["mine.toml:5:1:", "is -5", "between 0 and"]),

@@ -1,10 +1,12 @@
 //! The light a sensor sends: `[light]`.
 
+use std::f64::consts::PI;
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::limits::Check;
-use super::{Effect, Error};
+use super::{Effect, Error, Scan};
 use crate::units::RMS_OF_FWHM;
 
 /// `[light]` as typed.
@@ -17,12 +19,12 @@ pub(super) struct LightFile {
     /// Diameter of the beam at the sensor, mm, at 1/e².
     #[schemars(range(min = 0, max = 1000))]
     beam_diameter_mm: f64,
-    /// Divergence, mrad, full angle at 1/e².
+    /// Divergence, mrad, full angle at 1/e²; of beams, not of a flash.
     #[schemars(range(min = 0, max = 500))]
     divergence_mrad: f64,
-    /// Rays that stand for the footprint of the beam: 1, 7 or 19; 7 or 19 unless the list
-    /// `idealised` names `footprint`.
-    #[schemars(extend("enum" = [1, 7, 19]))]
+    /// Rays that stand for the footprint: 7 or 19 of a beam, 9 or 25 of the cell of a pixel of a flash; 1 if
+    /// the list `idealised` names `footprint`.
+    #[schemars(extend("enum" = [1, 7, 9, 19, 25]))]
     footprint_rays: u32,
     /// Length of a micropulse, ps, full width at half maximum; left out of light without pulses.
     #[schemars(range(min = 0.001, max = 1e9))]
@@ -54,9 +56,10 @@ pub struct Light {
     pub wavelength: f64,
     /// Beam diameter at the sensor (1/e²), m.
     pub beam_diameter: f64,
-    /// Full divergence (1/e²), rad; zero where the footprint is idealised away.
+    /// Full divergence (1/e²), rad; of a flash, the diameter of the circle that is as large as the cell of a
+    /// pixel. Zero where the footprint is idealised away.
     pub divergence: f64,
-    /// Rays that sample the footprint: 1, 7 or 19.
+    /// Rays that sample the footprint: 1, 7, 9, 19 or 25.
     pub footprint_rays: u32,
     /// Length of one micropulse (full width at half maximum), s; 0 of light without pulses.
     pub pulse: f64,
@@ -68,26 +71,19 @@ pub struct Light {
 }
 
 impl Check<'_> {
+    /// Checks the light. Its footprint is left out if nothing is known of the `scan`.
     pub(in crate::design) fn light(
         &self,
         light: &LightFile,
         is_pulsed: bool,
+        scan: Option<&Scan>,
         off: impl Fn(Effect) -> bool,
     ) -> Result<Light, Error> {
         let footprint_off = off(Effect::Footprint);
-        let rays = light.footprint_rays;
-        if ![1, 7, 19].contains(&rays) {
-            return self
-                .refuse("light.footprint_rays", format!("is {rays}, but can be 1, 7 or 19"));
-        }
-        let divergence = self.within("light.divergence_mrad", light.divergence_mrad, 0.0, 500.0)?;
-        if !footprint_off && (rays == 1 || divergence == 0.0) {
-            return self.refuse(
-                "light.footprint_rays",
-                "the footprint is not idealised: it needs 7 or 19 rays and a divergence, \
-                 or \"footprint\" in the list `idealised`",
-            );
-        }
+        let (footprint_rays, divergence) = match scan {
+            Some(scan) => self.footprint(light, scan, footprint_off)?,
+            None => (1, 0.0),
+        };
         let pulse = match light.pulse_ps {
             _ if !is_pulsed => 0.0,
             Some(typed) => self.within("light.pulse_ps", typed, 1e-3, 1e9)? * 1e-12,
@@ -108,10 +104,40 @@ impl Check<'_> {
                 0.0,
                 1e3,
             )? * 1e-3,
-            divergence: if footprint_off { 0.0 } else { divergence * 1e-3 },
-            footprint_rays: if footprint_off { 1 } else { rays },
+            divergence,
+            footprint_rays,
             pulse,
             spread: (!off(Effect::InterChip)).then_some(pulse * RMS_OF_FWHM),
         })
+    }
+
+    /// Returns the rays of a footprint and its divergence, rad.
+    fn footprint(
+        &self,
+        light: &LightFile,
+        scan: &Scan,
+        is_idealised: bool,
+    ) -> Result<(u32, f64), Error> {
+        let (rays, divergence) = (light.footprint_rays, light.divergence_mrad);
+        let mut divergence = self.within("light.divergence_mrad", divergence, 0.0, 500.0)? * 1e-3;
+        let (few, many, of, needs) = match scan.model().flooded_cell() {
+            Some([width, height]) => {
+                divergence = 2.0 * (width * height / PI).sqrt();
+                (9, 25, "a flash", "")
+            }
+            None => (7, 19, "a beam", " and a divergence"),
+        };
+        if ![1, few, many].contains(&rays) {
+            let message = format!("is {rays}, but can be 1, {few} or {many} of {of}");
+            return self.refuse("light.footprint_rays", message);
+        }
+        if !is_idealised && (rays == 1 || divergence == 0.0) {
+            let message = format!(
+                "the footprint is not idealised: it needs {few} or {many} rays{needs}, or \"footprint\" in \
+                 the list `idealised`"
+            );
+            return self.refuse("light.footprint_rays", message);
+        }
+        Ok(if is_idealised { (1, 0.0) } else { (rays, divergence) })
     }
 }

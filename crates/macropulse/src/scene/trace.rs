@@ -1,7 +1,8 @@
 //! The beam meets the scene: every shot becomes one or more rays, every ray its surfaces.
 //!
 //! 1. A beam without width is one ray. A beam with a width is a hexagonal set of rays, weighted
-//!    by the Gaussian irradiance at their place (docs/physics.md#footprint).
+//!    by the Gaussian irradiance at their place. A pixel of a flash gathers the light of its cell evenly
+//!    (docs/physics.md#footprint).
 //! 2. If the mirror moves during a macropulse, the macropulse is cut into sub-macropulses that leave in
 //!    different directions: each has rays of its own (docs/physics.md#mirror-motion).
 //! 3. A ray that meets glass leaves an echo there and goes on, weakened twice: on its way out and
@@ -122,15 +123,36 @@ impl Mirror<'_> {
     }
 }
 
-/// Offsets across the beam, as tangents, and the share of the energy each stands for.
+/// Offsets across the beam, as tangents, and the share of the energy each stands for. The first is its axis.
 pub(super) struct Footprint {
     offsets: Vec<([f64; 2], f32)>,
+    /// Cells of an image are as narrow as the cosine of their elevation.
+    is_cell: bool,
 }
 
 impl Footprint {
-    /// One ray, or one at the centre and six around it at half the 1/e² angle, or another twelve
-    /// at the full 1/e² angle. Irradiance falls as exp(−2θ²/θ₀²).
+    /// The rays of a beam are one at the centre, six around it at half the 1/e² angle, and another twelve at the
+    /// full 1/e² angle. Irradiance falls as exp(−2θ²/θ₀²). Those of a pixel of a flash are the middles of 3 × 3 or
+    /// 5 × 5 equal parts of its cell.
     pub(super) fn of(design: &Design) -> Self {
+        let count = design.light.footprint_rays;
+        match design.scan.model().flooded_cell() {
+            Some(cell) if count > 1 => Self::of_cell(cell, count),
+            _ => Self::of_beam(design),
+        }
+    }
+
+    fn of_cell([width, height]: [f64; 2], count: u32) -> Self {
+        let side = count.isqrt();
+        let weight = 1.0 / count as f32;
+        let part = |at: u32| (f64::from(at) + 0.5) / f64::from(side) - 0.5;
+        let offset = |at: u32| ([width * part(at % side), height * part(at / side)], weight);
+        let mut offsets: Vec<_> = (0..count).map(offset).collect();
+        offsets.swap(0, count as usize / 2);
+        Self { offsets, is_cell: true }
+    }
+
+    fn of_beam(design: &Design) -> Self {
         let edge = design.light.divergence / 2.0;
         let rings = match design.light.footprint_rays {
             1 => 0,
@@ -149,7 +171,7 @@ impl Footprint {
         }
         let total: f32 = offsets.iter().map(|(_, weight)| weight).sum();
         offsets.iter_mut().for_each(|(_, weight)| *weight /= total);
-        Self { offsets }
+        Self { offsets, is_cell: false }
     }
 
     /// Calls `cast` with the direction of each ray and its share of the energy.
@@ -161,8 +183,10 @@ impl Footprint {
             return;
         }
         let (left, up) = beam_axes(axis);
+        let [x, y, z] = axis;
+        let across = if self.is_cell { libm::hypot(x, y) } else { 1.0 };
         for &([a, b], weight) in around {
-            let [x, y, z] = axis;
+            let a = across * a;
             let aim = [
                 x + a * left[0] + b * up[0],
                 y + a * left[1] + b * up[1],
@@ -189,11 +213,46 @@ mod tests {
         let axis = |shot: usize| design.directions().of(log.row[shot], log.column[shot]);
         let around = (0..7).map(|ray| ([1e-3 * f64::from(ray), -5e-4 * f64::from(ray)], 0.125));
         for offsets in [vec![([0.0, 0.0], 1.0)], around.collect()] {
-            let footprint = Footprint { offsets };
+            let footprint = Footprint { offsets, is_cell: false };
             let [as_they_come, by_row] = [false, true]
                 .map(|by_row| scene.trace_with((&design, &log), &footprint, axis, by_row));
             assert!(by_row.shot.len() > 900 * footprint.offsets.len());
             assert_eq!(by_row, as_they_come);
+        }
+    }
+
+    /// The rays of the nine pixels of a flash are the pixels of a flash with 15 rows and columns.
+    #[test]
+    fn a_pixel_of_a_flash_gathers_the_light_of_its_cell() {
+        let rays_of = |set: &[(&str, &str)]| {
+            let set: Vec<_> = set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+            let design = Design::open("tmf8820", &set).unwrap();
+            let (footprint, directions) = (Footprint::of(&design), design.directions());
+            let mut rays = Vec::new();
+            for row in 0..design.scan.rows as u16 {
+                for column in 0..design.scan.columns as u16 {
+                    let mut total = 0.0;
+                    footprint.rays(directions.of(row, column), |ray, weight| {
+                        rays.push(ray);
+                        total += weight;
+                    });
+                    approx::assert_relative_eq!(total, 1.0, max_relative = 1e-6);
+                }
+            }
+            rays
+        };
+        let cells = rays_of(&[]);
+        let pixels = rays_of(&[
+            ("scan.flash.rows", "15"),
+            ("scan.flash.columns", "15"),
+            ("without", "footprint"),
+        ]);
+        assert_eq!((cells.len(), pixels.len()), (225, 225));
+        let apart = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>();
+        for pixel in &pixels {
+            let nearest = cells.iter().map(|cell| apart(cell, pixel).sqrt()).fold(1.0, f64::min);
+            // A twentieth of the angle from ray to ray, because cells of 11 degrees are not flat.
+            assert!(nearest < 0.05 * 0.0372, "{pixel:?}: {nearest}");
         }
     }
 

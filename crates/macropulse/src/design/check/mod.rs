@@ -154,7 +154,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     let light = effects.as_ref().and_then(|effects| {
         faults.0.extend(check.without_effect(file, effects));
         faults.0.extend(check.not_followed(&file.detector, effects));
-        faults.keep(check.light(&file.light, file.is_pulsed(), off))
+        faults.keep(check.light(&file.light, file.is_pulsed(), scan.as_ref(), off))
     });
     let right_within = match file.receiver.right_within_m {
         Some(typed) => {

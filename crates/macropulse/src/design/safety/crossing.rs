@@ -96,10 +96,10 @@ impl Sender<'_> {
     }
 
     /// All pixels at once, their light spread evenly over a field of these `sides`, rad, at the
-    /// distance of the eye; a wide beam widens it.
+    /// distance of the eye; a source as wide as the beam widens it.
     fn flood(&self, opening: &Opening, sides: [f64; 2], energies: &Energies) -> Crossing {
         let field = solid_angle(sides[0], sides[1]);
-        let wide = 2.0 * self.spot();
+        let wide = self.light.beam_diameter;
         let distance = self.condition.distance;
         let [across, down] = sides.map(|side| distance * side);
         let lit = field * distance * distance + (across + down) * wide + wide * wide;

@@ -7,7 +7,7 @@ use super::grid::{self, Grid};
 use super::model::{Extent, Model, Moment};
 use super::{Directions, Pattern, Typed};
 use crate::design::Error;
-use crate::design::limits::Check;
+use crate::design::limits::{Check, Idle};
 use crate::design::safety::Beams;
 
 /// Detectors of the largest flash: their numbers are 16 bits wide.
@@ -48,6 +48,14 @@ impl Typed for File {
             return check.refuse("scan.flash", message);
         }
         Ok(Pattern::Flash(Flash { grid }))
+    }
+
+    fn idle(&self) -> Option<Idle> {
+        Some(Idle {
+            key: "light.divergence_mrad".to_owned(),
+            by: "scan.flash",
+            why: "each pixel gathers the light of its cell, which a flood lights evenly",
+        })
     }
 }
 
@@ -111,6 +119,10 @@ impl Model for Flash {
 
     fn cell(&self) -> [f64; 2] {
         self.grid.cell()
+    }
+
+    fn flooded_cell(&self) -> Option<[f64; 2]> {
+        Some(self.cell())
     }
 
     fn extent(&self) -> Extent {

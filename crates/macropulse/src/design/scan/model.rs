@@ -57,6 +57,12 @@ pub(crate) trait Model {
     /// Width and height, rad, of the cell of a pixel.
     fn cell(&self) -> [f64; 2];
 
+    /// Width and height, rad, of the cell whose light a pixel gathers, if a flood lights it evenly; `None` if a
+    /// beam lights it.
+    fn flooded_cell(&self) -> Option<[f64; 2]> {
+        None
+    }
+
     /// All that it looks at.
     fn extent(&self) -> Extent;
 
