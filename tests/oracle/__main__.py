@@ -3,9 +3,11 @@
 import json
 import sys
 
+import beat
 import correlate
 import counting
 import link
+import phase
 import words
 
 QUESTIONS = {
@@ -22,6 +24,8 @@ QUESTIONS = {
     "family": words.compared,
     "gold": words.gold,
     "ranges": correlate.ranges,
+    "phase-ranges": phase.phase_ranges,
+    "beats": beat.beats,
 }
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod continuous;
 mod ranges;
 
 use std::collections::BTreeSet;
