@@ -3,6 +3,8 @@
 //! Only keys that a user has just typed count: those given with `--set`, and those of the file itself unless
 //! `--set` changes what makes them meaningless. Keys that a file inherits by `extends` may lie idle.
 
+use std::collections::BTreeSet;
+
 use super::SensorFile;
 use crate::design::detector::OF_SAMPLES;
 use crate::design::document::Typed;
@@ -21,9 +23,13 @@ const NO_BUDGET: &str = "photons follow from energy and optics: --without link-b
                          receiver instead";
 
 impl Check<'_> {
-    /// The keys that were typed for nothing, each as an error.
+    /// The keys that were typed for nothing, each as an error with the first reason for it.
     pub(super) fn without_effect(&self, file: &SensorFile, idealised: &[Effect]) -> Vec<Error> {
-        idle(file, idealised).into_iter().filter_map(|idle| self.told(&idle)).collect()
+        let mut told = BTreeSet::new();
+        let errors = idle(file, idealised)
+            .into_iter()
+            .filter_map(|idle| self.told(&idle).map(|error| (idle.key, error)));
+        errors.filter(|(key, _)| told.insert(key.clone())).map(|(_, error)| error).collect()
     }
 
     fn told(&self, idle: &Idle) -> Option<Error> {
@@ -150,6 +156,13 @@ mod tests {
             assert!(message.contains(key) && message.contains(by), "{key}: {message}");
             assert!(message.contains("has no effect"), "{message}");
         }
+        // Two reasons, one line.
+        let set = [("light.divergence_mrad".to_owned(), "1".to_owned())];
+        let message = Design::open("peregrine", &set).unwrap_err().to_string();
+        assert!(
+            message.contains("because of `scan.flash`") && !message.contains('\n'),
+            "{message}"
+        );
         let message = told("", &[("light.footprint_rays", "7")]);
         assert!(message.starts_with("--set: light.footprint_rays: has no effect"), "{message}");
     }
