@@ -10,7 +10,7 @@ mod common;
 mod continuous;
 mod ranges;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -39,6 +39,25 @@ fn ask(desk: &Desk, question: &str, given: &Value) -> Value {
             .arg(format!("@{}", file.display())),
     );
     serde_json::from_str(&said.unwrap_or_else(|why| panic!("{question}: {why}"))).unwrap()
+}
+
+/// The points of a cloud in text: the requested columns, by row and column.
+fn points<const N: usize>(
+    desk: &Desk,
+    cloud: &str,
+    names: [&str; N],
+) -> BTreeMap<(u64, u64), [f64; N]> {
+    let text = fs::read_to_string(desk.path().join(cloud)).unwrap();
+    let mut lines = text.lines();
+    let head: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let at = |name: &str| head.iter().position(|known| *known == name).unwrap();
+    let (row, column, places) = (at("row"), at("column"), names.map(at));
+    let point = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let pixel = (cells[row].parse().unwrap(), cells[column].parse().unwrap());
+        (pixel, places.map(|place| cells[place].parse().unwrap()))
+    };
+    lines.map(point).collect()
 }
 
 #[track_caller]

@@ -1,12 +1,12 @@
 //! The range of every shot: `macropulse decode` beside whoever tries every lag.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::fs;
 
 use serde_json::{Value, json};
 
-use super::ask;
 use super::common::Desk;
+use super::{ask, points};
 
 /// One tick of range, m.
 const TICK_M: f64 = 0.375e-3;
@@ -15,24 +15,7 @@ const TICK_M: f64 = 0.375e-3;
 const SENSOR: &str = "kim-park-2016-fixed --set scan.raster.rows=2 --set scan.scans_per_s=14400";
 
 /// Range and marks found of every point, by row and column.
-type Points = HashMap<(u64, u64), (f64, u64)>;
-
-/// Those of a cloud in text.
-fn points(desk: &Desk, cloud: &str) -> Points {
-    let text = fs::read_to_string(desk.path().join(cloud)).unwrap();
-    let mut lines = text.lines();
-    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let at = |name: &str| names.iter().position(|known| *known == name).unwrap();
-    let (row, column) = (at("row"), at("column"));
-    let (range, peak) = (at("range_m"), at("peak"));
-    lines
-        .map(|line| {
-            let cells: Vec<&str> = line.split(',').collect();
-            let pixel = (cells[row].parse().unwrap(), cells[column].parse().unwrap());
-            (pixel, (cells[range].parse().unwrap(), cells[peak].parse().unwrap()))
-        })
-        .collect()
-}
+type Points = BTreeMap<(u64, u64), [f64; 2]>;
 
 /// Returns the ranges that the oracle finds in `shots` and `ticks`, for one shot in `every`.
 fn found(desk: &Desk, shots: &str, ticks: &str, every: u32) -> Vec<Value> {
@@ -45,9 +28,9 @@ fn agreed(points: &Points, found: &[Value]) -> usize {
     let agrees = |shot: &&Value| {
         let pixel = (shot["row"].as_u64().unwrap(), shot["column"].as_u64().unwrap());
         let range = shot["range_m"].as_f64().unwrap();
-        points
-            .get(&pixel)
-            .is_some_and(|(point, peak)| (point - range).abs() <= TICK_M && shot["lit"] == *peak)
+        points.get(&pixel).is_some_and(|[point, peak]| {
+            (point - range).abs() <= TICK_M && shot["lit"].as_f64() == Some(*peak)
+        })
     };
     found.iter().filter(agrees).count()
 }
@@ -59,7 +42,7 @@ fn decode(desk: &Desk, folder: &str) -> Points {
     desk.json(&format!(
         "decode --sensor {SENSOR} {still} {files} --format csv -o {folder}-again --json"
     ));
-    points(desk, &format!("{folder}-again/scan-000000.csv"))
+    points(desk, &format!("{folder}-again/scan-000000.csv"), ["range_m", "peak"])
 }
 
 #[test]
