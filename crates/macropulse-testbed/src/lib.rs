@@ -1,4 +1,4 @@
-//! Means of tests: Python with packages, a browser, lists of sources.
+//! Means of tests: Python with packages, a browser, lists of sources, recordings of others.
 //!
 //! The tests read files that Macropulse writes with readers that others wrote, most of them Python packages.
 //! [`python`] makes an environment with the packages of a requirements file, once, in the target folder, and

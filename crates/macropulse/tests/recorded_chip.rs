@@ -30,7 +30,7 @@ struct Zone {
     simulated: Vec<f64>,
     /// Distance of the surfaces in the zone, m, and cosine of incidence, as light weighs them.
     surface: [f64; 2],
-    /// True if the chip sees a single surface, and the object or its table fills the zone.
+    /// True if the chip reports a single surface, and the object or its table fills the zone.
     has_one_surface: bool,
 }
 
@@ -151,8 +151,8 @@ fn line(points: &[(f64, f64)]) -> (f64, f64) {
 }
 
 /// N = 128 captures of each object, nine zones each. In four of five zones and more, the simulated peak lies
-/// within a bin of the recorded one; of those with a single surface, in nineteen of twenty. The counts of zones rise and fall together. Control: with the zones of
-/// the capture 40 places on, a pose that differs, fewer agree.
+/// within a bin of the recorded one; in nine of ten of those with a single surface. The counts of zones rise and fall
+/// together. Control: with the zones of the capture 40 places on, a pose that differs, fewer agree.
 #[test]
 fn the_simulated_chip_counts_as_the_real_one_does() {
     for (name, object) in [("pyramid.json", "pyramid2.stl"), ("tall_block.json", "tall_block.stl")]
@@ -213,11 +213,10 @@ fn slopes(points: &[(usize, [f64; 2], f64)]) -> [f64; 2] {
     [(ay * bb - by * ab) / determinant, (by * aa - ay * ab) / determinant]
 }
 
-/// Zones in which the chip sees a single surface of the pyramid, and which objects fill. The counts are those that
-/// Coates' correction gives. Simulated ones are as the inverse square of the distance and as the cosine of
-/// incidence. The zones of the chip differ in sensitivity, by a factor of three. Each with a level of its
-/// own, its counts are nearly as the cosine. With distance they fall more slowly: half of its surfaces lie
-/// within 10 cm, and there a lens beside the laser does not yet see all of its light.
+/// In zones that a single surface of the pyramid fills, simulated counts are as the inverse square of the distance and
+/// as the cosine of incidence. The zones of the chip differ in sensitivity by a factor of three. If each has a level of
+/// its own, counts of the chip are nearly as the cosine, and fall more slowly with distance. A reason may be that a
+/// lens beside the laser does not see all of its light from so near. All counts are corrected for pile-up.
 #[test]
 fn counts_follow_distance_and_incidence() {
     let Some(zones) = zones("pyramid.json", "pyramid2.stl") else { return };

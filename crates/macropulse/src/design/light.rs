@@ -56,7 +56,7 @@ pub struct Light {
     pub wavelength: f64,
     /// Beam diameter at the sensor (1/e²), m.
     pub beam_diameter: f64,
-    /// Full divergence (1/e²), rad; of a flash, the diameter of the circle that is as large as the cell of a
+    /// Full divergence (1/e²), rad; of a flash, the diameter of a circle with the area of the cell of a
     /// pixel. Zero where the footprint is idealised away.
     pub divergence: f64,
     /// Rays that sample the footprint: 1, 7, 9, 19 or 25.

@@ -126,7 +126,7 @@ impl Mirror<'_> {
 /// Offsets across the beam, as tangents, and the share of the energy each stands for. The first is its axis.
 pub(super) struct Footprint {
     offsets: Vec<([f64; 2], f32)>,
-    /// Cells of an image are as narrow as the cosine of their elevation.
+    /// True if offsets to the left are of azimuth, which the cosine of the elevation makes narrower.
     is_cell: bool,
 }
 
