@@ -2,9 +2,10 @@
 
 use crate::{Beats, Histograms, Samples, Taps, Ticks};
 
-/// Declares the kinds of record: variant, type, name.
+/// Declares the kinds of record: variant and type, its name in the plural, one of the things that are counted in it,
+/// and the ending of its files.
 macro_rules! kinds {
-    ($($(#[$doc:meta])* $Kind:ident, $name:literal;)+) => {
+    ($($(#[$doc:meta])* $Kind:ident, $name:literal, $one:literal, $ending:literal;)+) => {
         /// A kind of record.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum RecordKind {
@@ -12,9 +13,22 @@ macro_rules! kinds {
         }
 
         impl RecordKind {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$Kind,)+];
+
             /// Its name in the plural, as in files, formats and messages.
-            pub fn name(self) -> &'static str {
+            pub const fn name(self) -> &'static str {
                 match self { $(Self::$Kind => $name,)+ }
+            }
+
+            /// The things that are counted in it, in the singular.
+            pub fn counted(self) -> &'static str {
+                match self { $(Self::$Kind => $one,)+ }
+            }
+
+            /// The ending of its files in their binary form.
+            pub fn ending(self) -> &'static str {
+                match self { $(Self::$Kind => $ending,)+ }
             }
         }
 
@@ -53,39 +67,28 @@ macro_rules! kinds {
 
 kinds! {
     /// Ticks of time-to-digital converters.
-    Ticks, "ticks";
+    Ticks, "ticks", "tick", "mpt";
     /// Samples of analogue-to-digital converters.
-    Samples, "samples";
+    Samples, "samples", "sample", "mpw";
     /// Histograms of counters, added up over the pulses of a burst.
-    Histograms, "histograms";
+    Histograms, "histograms", "count", "mph";
     /// Taps of lock-in detectors.
-    Taps, "taps";
+    Taps, "taps", "tap", "mpa";
     /// Beats of coherent detectors.
-    Beats, "beats";
+    Beats, "beats", "peak", "mpb";
 }
 
 impl RecordKind {
-    /// True if there is a record of each shot, made of the light of that shot alone.
+    /// The names of all kinds, with commas between them and `word` before the last one.
+    pub fn listed(word: &str) -> String {
+        let names: Vec<&str> = Self::ALL.iter().map(|kind| kind.name()).collect();
+        let (others, last) = names.split_at(names.len() - 1);
+        format!("{} {word} {}", others.join(", "), last.concat())
+    }
+
+    /// True if there is a record of each shot, made of the light of that shot alone. Ticks and samples are of a time
+    /// in which light of many shots may arrive.
     pub fn is_by_shot(self) -> bool {
-        matches!(self, Self::Histograms | Self::Taps | Self::Beats)
-    }
-}
-
-impl Given {
-    /// How many ticks there are, or samples of all channels, or bins of all histograms, or
-    /// taps or places for peaks of all shots.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Ticks(ticks) => ticks.len(),
-            Self::Samples(samples) => samples.code.len(),
-            Self::Histograms(histograms) => histograms.counts.len(),
-            Self::Taps(taps) => taps.codes.len(),
-            Self::Beats(beats) => beats.found.len(),
-        }
-    }
-
-    /// True if the record is empty.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        !matches!(self, Self::Ticks | Self::Samples)
     }
 }

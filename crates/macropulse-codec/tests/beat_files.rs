@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used)]
 
-use macropulse_codec::files::{BeatHeader, BeatReader, BeatWriter, Digest, Error};
-use macropulse_codec::{Beats, Peak};
+use macropulse_codec::files::{Digest, Error, RecordHeader, RecordReader, RecordWriter};
+use macropulse_codec::{Beats, Given, Peak};
 use proptest::prelude::*;
 
-fn header() -> BeatHeader {
-    BeatHeader { ramps: 2, peaks: 1, digest: Digest::parse(&"7f".repeat(16)), count: Some(2) }
+fn header() -> RecordHeader {
+    RecordHeader { digest: Digest::parse(&"7f".repeat(16)), count: Some(2) }
 }
 
 fn beats() -> Beats {
@@ -16,19 +16,20 @@ fn beats() -> Beats {
     Beats { ramps: 2, peaks: 1, found }
 }
 
-fn written(header: &BeatHeader, beats: &Beats, first: u64) -> Vec<u8> {
+fn written(header: &RecordHeader, beats: &Beats, first: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
-    BeatWriter::new(&mut bytes, header).unwrap().write(beats, first).unwrap();
+    RecordWriter::new(&mut bytes, beats, header).unwrap().write(beats, first).unwrap();
     bytes
 }
 
-type Read = (BeatHeader, Vec<(u64, Vec<Peak>)>);
+type Read = (RecordHeader, Vec<(u64, Vec<Peak>)>);
 
 fn read(bytes: &[u8]) -> Result<Read, Error> {
-    let mut reader = BeatReader::new(bytes, &header())?;
+    let mut reader = RecordReader::new(bytes, &beats())?;
     let mut read = Vec::new();
-    while let Some(shot) = reader.next_shot()? {
-        read.push(shot);
+    while let Some((shot, record)) = reader.next_shot()? {
+        let Given::Beats(beats) = record else { panic!("{record:?}") };
+        read.push((shot, beats.found));
     }
     Ok((*reader.header(), read))
 }

@@ -11,7 +11,7 @@ use macropulse_codec::files::{
     Digest, Error, Form, Limits, Place, Shot, ShotHeader, ShotReader, ShotWriter, Stream,
     TickHeader, TickReader, TickWriter, What,
 };
-use macropulse_codec::{Cut, Given, ShotLog, Tick, Ticks};
+use macropulse_codec::{Cut, Given, RecordKind, ShotLog, Tick, Ticks};
 use proptest::prelude::*;
 
 const TICK_FS: i64 = 1000;
@@ -209,7 +209,11 @@ fn what_is_wrong_in_text_has_its_line() {
     ] {
         let (what, place, sentence) =
             told(&read_ticks(format!("{TICKS}{rest}").as_bytes(), 4).unwrap_err());
-        assert_eq!((what, place), (What::Ticks, Some(Place::Line(line))), "{sentence}");
+        assert_eq!(
+            (what, place),
+            (What::Record(RecordKind::Ticks), Some(Place::Line(line))),
+            "{sentence}"
+        );
         assert!(sentence.contains(words), "{sentence}");
     }
     let sentence = |text: &str| told(&read_ticks(text.as_bytes(), 1).unwrap_err()).2;

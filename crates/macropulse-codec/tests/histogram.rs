@@ -7,8 +7,8 @@ use macropulse_codec::decode::histogram::{
     HistogramMethod, HistogramReceiver, PileUp, Pulse, coates, decode,
 };
 use macropulse_codec::decode::{Error, Pick, Reject, Returns};
-use macropulse_codec::files::{HistogramHeader, HistogramReader, HistogramWriter};
-use macropulse_codec::{Histograms, ShotLog};
+use macropulse_codec::files::{RecordHeader, RecordReader, RecordWriter};
+use macropulse_codec::{Given, Histograms, ShotLog};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Binomial, Distribution, Poisson, Uniform};
@@ -387,14 +387,13 @@ fn a_file_of_histograms_becomes_distances() {
         })
         .collect();
     let record = histograms(CYCLES, &counts);
-    let Histograms { bin_fs, offset_fs, bins, .. } = record;
-    let header = HistogramHeader { bin_fs, offset_fs, bins, digest: None, count: Some(200) };
+    let header = RecordHeader { digest: None, count: Some(200) };
     let mut file = Vec::new();
-    HistogramWriter::new(&mut file, &header).unwrap().write(&record, 0).unwrap();
-    let mut reader = HistogramReader::new(&file[..], &header).unwrap();
+    RecordWriter::new(&mut file, &record, &header).unwrap().write(&record, 0).unwrap();
+    let mut reader = RecordReader::new(&file[..], &record).unwrap();
     let mut read = Histograms { cycles: Vec::new(), counts: Vec::new(), ..record };
-    while let Some(one) = reader.next_histogram().unwrap() {
-        read.cycles.push(one.cycles);
+    while let Some((_, Given::Histograms(one))) = reader.next_shot().unwrap() {
+        read.cycles.extend(one.cycles);
         read.counts.extend(one.counts);
     }
     let pulse = Pulse::Measured { counts: tailed(), origin: 0.0 };

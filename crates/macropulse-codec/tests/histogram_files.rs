@@ -6,15 +6,12 @@
 use macropulse_codec::decode::histogram::{
     HistogramMethod, HistogramReceiver, PileUp, Pulse, decode,
 };
-use macropulse_codec::files::{
-    Digest, Error, Histogram, HistogramHeader, HistogramReader, HistogramWriter,
-};
-use macropulse_codec::{Histograms, ShotLog};
+use macropulse_codec::files::{Digest, Error, RecordHeader, RecordReader, RecordWriter};
+use macropulse_codec::{Given, Histograms, ShotLog};
 use proptest::prelude::*;
 
-fn header() -> HistogramHeader {
-    HistogramHeader { bin_fs: 95_000, offset_fs: -1000, bins: 3, digest: None, count: None }
-}
+/// The header of two histograms.
+const TWO: RecordHeader = RecordHeader { digest: None, count: Some(2) };
 
 fn histograms() -> Histograms {
     Histograms {
@@ -26,23 +23,20 @@ fn histograms() -> Histograms {
     }
 }
 
-fn written(header: &HistogramHeader, parts: &[(u64, Histograms)]) -> Vec<u8> {
+fn written(header: &RecordHeader, record: &Histograms, first: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let mut writer = HistogramWriter::new(&mut bytes, header).unwrap();
-    for (first, part) in parts {
-        writer.write(part, *first).unwrap();
-    }
+    RecordWriter::new(&mut bytes, record, header).unwrap().write(record, first).unwrap();
     bytes
 }
 
-fn read(
-    bytes: &[u8],
-    wanted: &HistogramHeader,
-) -> Result<(HistogramHeader, Vec<Histogram>), Error> {
-    let mut reader = HistogramReader::new(bytes, wanted)?;
+type Read = (RecordHeader, Vec<(u64, Histograms)>);
+
+fn read(bytes: &[u8], wanted: &Histograms) -> Result<Read, Error> {
+    let mut reader = RecordReader::new(bytes, wanted)?;
     let mut read = Vec::new();
-    while let Some(histogram) = reader.next_histogram()? {
-        read.push(histogram);
+    while let Some((shot, record)) = reader.next_shot()? {
+        let Given::Histograms(histogram) = record else { panic!("{record:?}") };
+        read.push((shot, histogram));
     }
     Ok((*reader.header(), read))
 }
@@ -50,8 +44,8 @@ fn read(
 /// The bytes of the documentation, one by one.
 #[test]
 fn a_file_is_as_it_is_documented() {
-    let header = HistogramHeader { digest: Some(Digest([9; 16])), count: Some(2), ..header() };
-    let bytes = written(&header, &[(300, histograms())]);
+    let header = RecordHeader { digest: Some(Digest([9; 16])), ..TWO };
+    let bytes = written(&header, &histograms(), 300);
     assert_eq!(bytes.len(), 128 + 2 * (16 + 12));
     assert_eq!(bytes[..24], *b"MPHISTO\0\x01\0\0\0\x80\0\0\0\x02\0\0\0\0\0\0\0");
     assert_eq!(bytes[24..32], 95_000_i64.to_le_bytes());
@@ -71,15 +65,15 @@ fn with(bytes: &[u8], at: usize, others: &[u8]) -> Vec<u8> {
 
 #[test]
 fn what_is_wrong_is_one_sentence_with_its_place() {
-    let good = written(&HistogramHeader { count: Some(2), ..header() }, &[(5, histograms())]);
+    let good = written(&TWO, &histograms(), 5);
     let second = 128 + 28;
-    let refused = |bytes: &[u8]| read(bytes, &header()).map_err(|error| error.to_string());
+    let refused = |bytes: &[u8]| read(bytes, &histograms()).map_err(|error| error.to_string());
     for (bytes, words) in [
         (
             good[..good.len() - 3].to_vec(),
             &["byte 156", "25 bytes into a record of 28", "truncated"][..],
         ),
-        (good[..second].to_vec(), &["after 1 of 2 histograms", "truncated"]),
+        (good[..second].to_vec(), &["after 1 of 2 shots", "truncated"]),
         (good[..second + 16].to_vec(), &["16 bytes into a record of 28", "truncated"]),
         (good[..100].to_vec(), &["100 bytes into a record of 128"]),
         (Vec::new(), &["is empty"]),
@@ -88,7 +82,7 @@ fn what_is_wrong_is_one_sentence_with_its_place() {
         (with(&good, 0, b"MPTICKS\0"), &["these are ticks, where the sensor records histograms"]),
         (with(&good, 0, b"MPSHOTS\0"), &["the shot log comes first, then the histograms"]),
         (with(&good, 8, &[2]), &["version `2` of histograms", "reads 1"]),
-        (with(&good, 16, &[1]), &["byte 156", "there are 1 histograms only"]),
+        (with(&good, 16, &[1]), &["byte 156", "there are 1 shots only"]),
         (with(&good, 24, &0_i64.to_le_bytes()), &["bins of 0 fs", "1 fs to 137 s"]),
         (
             with(&good, 24, &i64::MAX.to_le_bytes()),
@@ -134,14 +128,13 @@ proptest! {
         first in 0..u64::from(u32::MAX),
         knows_count in any::<bool>(),
     ) {
-        let Histograms { bin_fs, offset_fs, bins, .. } = histograms;
         let count = knows_count.then_some(histograms.len() as u64);
-        let header = HistogramHeader { bin_fs, offset_fs, bins, digest: Digest::parse(&"7f".repeat(16)), count };
-        let (is, found) = read(&written(&header, &[(first, histograms.clone())]), &header).unwrap();
+        let header = RecordHeader { digest: Digest::parse(&"7f".repeat(16)), count };
+        let (is, found) = read(&written(&header, &histograms, first), &histograms).unwrap();
         prop_assert_eq!(is, header);
         prop_assert_eq!(found.len(), histograms.len());
-        for (at, one) in found.into_iter().enumerate() {
-            prop_assert_eq!((one.shot, one.cycles), (first + at as u64, histograms.cycles[at]));
+        for (at, (shot, one)) in found.into_iter().enumerate() {
+            prop_assert_eq!((shot, one.cycles), (first + at as u64, vec![histograms.cycles[at]]));
             prop_assert_eq!(&one.counts[..], histograms.of(at));
         }
     }
@@ -152,14 +145,14 @@ proptest! {
         spoils in proptest::collection::vec((0..184_usize, any::<u8>()), 0..6),
         keep in 0..400_usize,
     ) {
-        let mut file = written(&HistogramHeader { count: Some(2), ..header() }, &[(1, histograms())]);
+        let mut file = written(&TWO, &histograms(), 1);
         for (at, byte) in spoils {
             file[at] = byte;
         }
         file.truncate(keep);
-        match read(&file, &header()) {
+        match read(&file, &histograms()) {
             Err(error) => prop_assert_eq!(error.to_string().lines().count(), 1),
-            Ok((_, read)) => prop_assert!(read.iter().all(|one| one.counts.len() == 3)),
+            Ok((_, read)) => prop_assert!(read.iter().all(|(_, one)| one.counts.len() == 3)),
         }
     }
 }

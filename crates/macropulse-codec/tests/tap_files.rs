@@ -2,31 +2,32 @@
 
 #![allow(clippy::unwrap_used)]
 
-use macropulse_codec::Taps;
-use macropulse_codec::files::{Digest, Error, TapHeader, TapReader, TapWriter};
+use macropulse_codec::files::{Digest, Error, RecordHeader, RecordReader, RecordWriter};
+use macropulse_codec::{Given, Taps};
 use proptest::prelude::*;
 
-fn header() -> TapHeader {
-    TapHeader { taps: 3, digest: Digest::parse(&"7f".repeat(16)), count: Some(2) }
+fn header() -> RecordHeader {
+    RecordHeader { digest: Digest::parse(&"7f".repeat(16)), count: Some(2) }
 }
 
 fn taps() -> Taps {
     Taps { taps: 3, codes: vec![0, 258, 1, 7, u16::MAX, 9] }
 }
 
-fn written(header: &TapHeader, taps: &Taps, first: u64) -> Vec<u8> {
+fn written(header: &RecordHeader, taps: &Taps, first: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
-    TapWriter::new(&mut bytes, header).unwrap().write(taps, first).unwrap();
+    RecordWriter::new(&mut bytes, taps, header).unwrap().write(taps, first).unwrap();
     bytes
 }
 
-type Read = (TapHeader, Vec<(u64, Vec<u16>)>);
+type Read = (RecordHeader, Vec<(u64, Vec<u16>)>);
 
 fn read(bytes: &[u8]) -> Result<Read, Error> {
-    let mut reader = TapReader::new(bytes, &header())?;
+    let mut reader = RecordReader::new(bytes, &taps())?;
     let mut read = Vec::new();
-    while let Some(shot) = reader.next_shot()? {
-        read.push(shot);
+    while let Some((shot, record)) = reader.next_shot()? {
+        let Given::Taps(taps) = record else { panic!("{record:?}") };
+        read.push((shot, taps.codes));
     }
     Ok((*reader.header(), read))
 }

@@ -70,9 +70,7 @@ targets! {
     shots, recorded::shots, 4096;
     ticks, recorded::ticks, 4096;
     samples, recorded::samples, 8192;
-    histograms, recorded::histograms, 4096;
-    taps, recorded::taps, 4096;
-    beats, recorded::beats, 4096;
+    records, recorded::records, 4096;
     stream, recorded::stream, 4096;
     receiver, receivers::decode, 2048;
 }

@@ -1,10 +1,9 @@
-//! Shots, ticks, samples, histograms, taps and beats as text and as bytes.
+//! Shots and their records as text and as bytes.
 
 use macropulse::codec::files::{
-    BeatHeader, BeatReader, Error, HistogramHeader, HistogramReader, Limits, SampleHeader,
-    SampleReader, ShotReader, Stream, TapHeader, TapReader, TickReader,
+    Error, Limits, RecordReader, SampleHeader, SampleReader, ShotReader, Stream, TickReader,
 };
-use macropulse::codec::{Cut, Given};
+use macropulse::codec::{Beats, Cut, Given, Histograms, Peak, Taps};
 
 use crate::assert_told;
 
@@ -88,43 +87,27 @@ pub fn samples(bytes: &[u8]) {
     }
 }
 
-/// Header of the sensor's histograms.
-const HISTOGRAMS: HistogramHeader =
-    HistogramHeader { bin_fs: TICK_FS, offset_fs: 0, bins: 32, digest: None, count: None };
+/// A record of each kind that is made shot by shot, as a sensor has it.
+fn blanks() -> [Given; 3] {
+    let (cycles, counts) = (vec![0], vec![0; 32]);
+    let histograms = Histograms { bin_fs: TICK_FS, offset_fs: 0, bins: 32, cycles, counts };
+    let beats = Beats { ramps: 2, peaks: 2, found: vec![Peak::EMPTY; 4] };
+    [
+        Given::Histograms(histograms),
+        Given::Taps(Taps { taps: 8, codes: vec![0; 8] }),
+        Given::Beats(beats),
+    ]
+}
 
-/// Reads `bytes` as histograms.
-pub fn histograms(bytes: &[u8]) {
-    if let Some(mut reader) = told(HistogramReader::new(bytes, &HISTOGRAMS)) {
-        while let Some(histogram) = told(reader.next_histogram()).flatten() {
-            assert_eq!(histogram.counts.len(), HISTOGRAMS.bins as usize);
+/// Reads `bytes` as a record of each kind that is made shot by shot, and cuts that of three shots out of them.
+pub fn records(bytes: &[u8]) {
+    for blank in blanks() {
+        let Some(wanted) = blank.of_shots() else { continue };
+        let Some(shots) = told(ShotReader::new(SHOTS, LIMITS)) else { return };
+        let Some(records) = told(RecordReader::new(bytes, wanted)) else { continue };
+        let mut stream = Stream::of_records(CUT, shots, records);
+        while let Some((log, given)) = told(stream.next_band(|first| first + 2)).flatten() {
+            assert_eq!(given.len(), log.len() * blank.len());
         }
-    }
-}
-
-/// Header of the sensor's beats.
-const BEATS: BeatHeader = BeatHeader { ramps: 2, peaks: 2, digest: None, count: None };
-
-/// Reads `bytes` as beats, and cuts those of three shots out of them.
-pub fn beats(bytes: &[u8]) {
-    let Some(shots) = told(ShotReader::new(SHOTS, LIMITS)) else { return };
-    let Some(beats) = told(BeatReader::new(bytes, &BEATS)) else { return };
-    let mut stream = Stream::of_beats(CUT, shots, beats);
-    while let Some((log, given)) = told(stream.next_band(|first| first + 2)).flatten() {
-        let Given::Beats(beats) = given else { break };
-        assert_eq!(beats.found.len(), 4 * log.len());
-    }
-}
-
-/// Header of the sensor's taps.
-const TAPS: TapHeader = TapHeader { taps: 8, digest: None, count: None };
-
-/// Reads `bytes` as taps, and cuts those of three shots out of them.
-pub fn taps(bytes: &[u8]) {
-    let Some(shots) = told(ShotReader::new(SHOTS, LIMITS)) else { return };
-    let Some(taps) = told(TapReader::new(bytes, &TAPS)) else { return };
-    let mut stream = Stream::of_taps(CUT, shots, taps);
-    while let Some((log, given)) = told(stream.next_band(|first| first + 2)).flatten() {
-        let Given::Taps(taps) = given else { break };
-        assert_eq!(taps.codes.len(), TAPS.taps as usize * log.len());
     }
 }

@@ -1,8 +1,7 @@
 //! Shots and records as dictionaries of columns, to Python and back.
 
-use macropulse::codec::{
-    Beats, Given, Histograms, Peak, RecordKind, Samples, ShotLog, Taps, Ticks,
-};
+use macropulse::codec::files::{RecordColumn, RecordValues, ShotRecord};
+use macropulse::codec::{Given, RecordKind, Samples, ShotLog, Ticks};
 use macropulse::design::Design;
 use macropulse::emit::{Shot, shot_of_pixel};
 use macropulse::told;
@@ -20,20 +19,46 @@ const SHOTS: [&str; 8] =
     ["first", "owned", "fired_at_fs", "row", "column", "label", "word", "channel"];
 const TICKS: [&str; 4] = ["epoch", "tick", "channel", "amplitude"];
 const SAMPLES: [&str; 3] = ["epoch", "channel", "code"];
-const HISTOGRAMS: [&str; 4] = ["bin_fs", "offset_fs", "cycles", "counts"];
-const TAPS: [&str; 1] = ["codes"];
-
-/// The columns of beats.
-const BEATS: [&str; 2] = ["frequency", "power"];
 
 /// The columns of a record.
 pub fn dictionary_of_record(py: Python<'_>, record: Given) -> PyResult<Bound<'_, PyDict>> {
+    let shots = record.of_shots().map_or(0, ShotRecord::shots);
     match record {
         Given::Ticks(ticks) => dictionary_of_ticks(py, ticks),
         Given::Samples(samples) => dictionary_of_samples(py, samples),
-        Given::Histograms(histograms) => dictionary_of_histograms(py, histograms),
-        Given::Taps(taps) => dictionary_of_taps(py, taps),
-        Given::Beats(beats) => dictionary_of_beats(py, &beats),
+        record => {
+            let columns = PyDict::new(py);
+            for column in record.into_columns().unwrap_or_default() {
+                set_column(&columns, column, shots)?;
+            }
+            Ok(columns)
+        }
+    }
+}
+
+/// Adds a column of a record of `shots` shots.
+fn set_column(columns: &Bound<'_, PyDict>, column: RecordColumn, shots: usize) -> PyResult<()> {
+    let rows = column.is_table.then_some(shots);
+    match column.values {
+        RecordValues::Shared(value) => columns.set_item(column.name, value),
+        RecordValues::U16(values) => set_values(columns, column.name, values, rows),
+        RecordValues::U32(values) => set_values(columns, column.name, values, rows),
+        RecordValues::F64(values) => set_values(columns, column.name, values, rows),
+    }
+}
+
+/// Adds an array to a dictionary; a table of so many `rows`, if it has rows.
+fn set_values<T: Element>(
+    columns: &Bound<'_, PyDict>,
+    name: &str,
+    values: Vec<T>,
+    rows: Option<usize>,
+) -> PyResult<()> {
+    let shape = rows.map(|rows| [rows, values.len() / rows.max(1)]);
+    let array = PyArray1::from_vec(columns.py(), values);
+    match shape {
+        Some(shape) => columns.set_item(name, array.reshape(shape)?),
+        None => columns.set_item(name, array),
     }
 }
 
@@ -69,47 +94,17 @@ fn dictionary_of_samples(py: Python<'_>, samples: Samples) -> PyResult<Bound<'_,
     Ok(columns)
 }
 
-fn dictionary_of_histograms(py: Python<'_>, histograms: Histograms) -> PyResult<Bound<'_, PyDict>> {
-    let columns = PyDict::new(py);
-    let shape = [histograms.len(), histograms.bins as usize];
-    columns.set_item("bin_fs", histograms.bin_fs)?;
-    columns.set_item("offset_fs", histograms.offset_fs)?;
-    columns.set_item("cycles", PyArray1::from_vec(py, histograms.cycles))?;
-    columns.set_item("counts", PyArray1::from_vec(py, histograms.counts).reshape(shape)?)?;
-    Ok(columns)
-}
-
-fn dictionary_of_taps(py: Python<'_>, taps: Taps) -> PyResult<Bound<'_, PyDict>> {
-    let columns = PyDict::new(py);
-    let each = taps.taps.max(1) as usize;
-    let shape = [taps.codes.len() / each, each];
-    columns.set_item("codes", PyArray1::from_vec(py, taps.codes).reshape(shape)?)?;
-    Ok(columns)
-}
-
-fn dictionary_of_beats<'py>(py: Python<'py>, beats: &Beats) -> PyResult<Bound<'py, PyDict>> {
-    let columns = PyDict::new(py);
-    let each = (beats.ramps * beats.peaks).max(1) as usize;
-    let shape = [beats.found.len() / each, each];
-    let frequency: Vec<f64> = beats.found.iter().map(|peak| peak.bins()).collect();
-    let power: Vec<f64> = beats.found.iter().map(|peak| peak.power()).collect();
-    for (key, column) in BEATS.into_iter().zip([frequency, power]) {
-        columns.set_item(key, PyArray1::from_vec(py, column).reshape(shape)?)?;
-    }
-    Ok(columns)
-}
-
 /// The record of a sensor that a dictionary holds.
 ///
 /// # Errors
 /// If columns are missing, unknown, of unequal length, or of another sensor.
 pub fn record_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Given> {
+    if let Some(blank) = design.blank_record() {
+        return record_of_shots(design, blank, given);
+    }
     Ok(match design.records() {
         RecordKind::Samples => Given::Samples(samples_of(design, given)?),
-        RecordKind::Ticks => Given::Ticks(ticks_of(design, given)?),
-        RecordKind::Histograms => Given::Histograms(histograms_of(design, given)?),
-        RecordKind::Taps => Given::Taps(taps_of(design, given)?),
-        RecordKind::Beats => Given::Beats(beats_of(design, given)?),
+        _ => Given::Ticks(ticks_of(design, given)?),
     })
 }
 
@@ -340,12 +335,90 @@ fn quietly<'py, T>(
     outcome
 }
 
-/// The column `key` of a dictionary, which has a row for each shot and a column for each `item`: how many of both, and
-/// its entries behind each other.
-fn by_shot<T: Number>(
+/// The record of shots that a dictionary holds, with the columns that a `blank` one of the sensor has. One that is
+/// missing is as in the blank for every shot, unless it is a table.
+fn record_of_shots(design: &Design, blank: Given, given: &Bound<'_, PyDict>) -> PyResult<Given> {
+    let what = design.records().name();
+    let Some(like) = blank.of_shots().map(|record| record.blank(0)) else { return Ok(blank) };
+    let (number, numbers, name) = (like.number(), like.numbers(), &design.name);
+    let columns = blank.into_columns().unwrap_or_default();
+    let known: Vec<&str> = columns.iter().map(|column| column.name).collect();
+    check_keys(given, what, &known)?;
+    let mut rows: Option<usize> = None;
+    for column in columns.iter().filter(|column| column.is_table) {
+        let [shots, wide] = shape_of(given, what, column.name, number)?;
+        if wide != numbers {
+            let key = column.name;
+            return Err(wrong(format!(
+                "{what}: `{key}` has {wide} columns, and {name} has {numbers} {number}s"
+            )));
+        }
+        if let Some(others) = rows.filter(|others| *others != shots) {
+            let key = column.name;
+            return Err(wrong(format!(
+                "{what}: `{key}` has {shots} rows, and the column before it {others}"
+            )));
+        }
+        rows = Some(shots);
+    }
+    let shots = rows.unwrap_or_default();
+    let mut values = Vec::new();
+    for RecordColumn { name: key, is_table, values: of_blank } in columns {
+        values.push(match of_blank {
+            RecordValues::Shared(own) => {
+                let found: i64 = entry(given, (what, key, "a whole number"), || own)?;
+                if found != own {
+                    return Err(wrong(format!("{what}: {key} is {found}, and {own} of {name}")));
+                }
+                RecordValues::Shared(own)
+            }
+            RecordValues::U16(one) => {
+                RecordValues::U16(read(given, (what, key), is_table, &one, shots)?)
+            }
+            RecordValues::U32(one) => {
+                RecordValues::U32(read(given, (what, key), is_table, &one, shots)?)
+            }
+            RecordValues::F64(one) => {
+                RecordValues::F64(read(given, (what, key), is_table, &one, shots)?)
+            }
+        });
+    }
+    Ok(like.of_columns(shots, values).given())
+}
+
+/// The column of `shots` shots that a dictionary holds, row by row where it is a table; where it is missing, `one` for
+/// each shot.
+fn read<T: Number>(
     given: &Bound<'_, PyDict>,
-    (what, key, item): (&str, &str, &str),
-) -> PyResult<([usize; 2], Vec<T>)> {
+    (what, key): (&str, &str),
+    is_table: bool,
+    one: &[T],
+    shots: usize,
+) -> PyResult<Vec<T>> {
+    if !is_table {
+        let found = column(given, (what, key), Some(one.repeat(shots)))?;
+        if found.len() != shots {
+            let length = found.len();
+            return Err(wrong(format!("{what}: `{key}` has {length} entries for {shots} shots")));
+        }
+        return Ok(found);
+    }
+    let Some(table) = given.get_item(key)? else {
+        return Err(wrong(format!("{what}: there is no column `{key}`")));
+    };
+    let typed = given.py().import("numpy")?.call_method1("asarray", (&table,))?;
+    let flat = PyDict::new(given.py());
+    flat.set_item(key, typed.call_method0("ravel")?)?;
+    column(&flat, (what, key), None)
+}
+
+/// The shape of the column `key` of a dictionary, which has a row for each shot and a column for each `number`.
+fn shape_of(
+    given: &Bound<'_, PyDict>,
+    what: &str,
+    key: &str,
+    number: &str,
+) -> PyResult<[usize; 2]> {
     let Some(table) = given.get_item(key)? else {
         return Err(wrong(format!("{what}: there is no column `{key}`")));
     };
@@ -353,75 +426,9 @@ fn by_shot<T: Number>(
     let shape: Vec<usize> = typed.getattr("shape")?.extract()?;
     let [rows, columns] = shape[..] else {
         return Err(wrong(format!(
-            "{what}: `{key}` has {} dimensions; give it a row for each shot and a column for each {item}",
+            "{what}: `{key}` has {} dimensions; give it a row for each shot and a column for each {number}",
             shape.len()
         )));
     };
-    let flat = PyDict::new(given.py());
-    flat.set_item(key, typed.call_method0("ravel")?)?;
-    Ok(([rows, columns], column(&flat, (what, key), None)?))
-}
-
-/// The taps that a dictionary holds.
-fn taps_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Taps> {
-    check_keys(given, "taps", &TAPS)?;
-    let ([_, taps], codes) = by_shot(given, ("taps", "codes", "tap"))?;
-    let wanted = design.tap_header().map_or(0, |header| header.taps);
-    if taps != wanted as usize {
-        let name = &design.name;
-        return Err(wrong(format!(
-            "taps: `codes` has {taps} columns, and {name} has {wanted} taps"
-        )));
-    }
-    Ok(Taps { taps: wanted, codes })
-}
-
-fn histograms_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Histograms> {
-    check_keys(given, "histograms", &HISTOGRAMS)?;
-    let ([rows, bins], counts) = by_shot(given, ("histograms", "counts", "bin"))?;
-    let tick_fs = design.clock.tick_fs;
-    let bin_fs: i64 =
-        entry(given, ("histograms", "bin_fs", "a whole number, of femtoseconds"), || tick_fs)?;
-    if bin_fs != tick_fs {
-        return Err(wrong(format!(
-            "histograms: bins of {bin_fs} fs, but those of {} are {tick_fs} fs wide",
-            design.name
-        )));
-    }
-    let pulses = design.emission.burst().map_or(1, |burst| burst.pulses);
-    Ok(Histograms {
-        bin_fs,
-        offset_fs: entry(
-            given,
-            ("histograms", "offset_fs", "a whole number, of femtoseconds"),
-            || 0,
-        )?,
-        bins: bins as u32,
-        cycles: column(given, ("histograms", "cycles"), Some(vec![pulses; rows]))?,
-        counts,
-    })
-}
-
-/// The beats that a dictionary holds.
-fn beats_of(design: &Design, given: &Bound<'_, PyDict>) -> PyResult<Beats> {
-    check_keys(given, "beats", &BEATS)?;
-    let ([shots, places], frequency): ([usize; 2], Vec<f64>) =
-        by_shot(given, ("beats", "frequency", "place for a peak"))?;
-    let (shape, power): ([usize; 2], Vec<f64>) =
-        by_shot(given, ("beats", "power", "place for a peak"))?;
-    let (ramps, peaks) = design.beat_header().map_or((0, 0), |it| (it.ramps, it.peaks));
-    if places != (ramps * peaks) as usize {
-        let name = &design.name;
-        return Err(wrong(format!(
-            "beats: `frequency` has {places} columns, and {name} has {ramps} ramps with {peaks} peaks each"
-        )));
-    }
-    if shape != [shots, places] {
-        return Err(wrong(format!(
-            "beats: `power` has the shape {shape:?}, and `frequency` has {:?}",
-            [shots, places]
-        )));
-    }
-    let found = frequency.into_iter().zip(power).map(|(bins, power)| Peak::of(bins, power));
-    Ok(Beats { ramps, peaks, found: found.collect() })
+    Ok([rows, columns])
 }

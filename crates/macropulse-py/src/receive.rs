@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use macropulse::channel::Operating;
+use macropulse::codec::RecordKind;
 use macropulse::design::Design;
 use macropulse::emit::{Band, bands};
 use macropulse::points::{Piece, PointCloud, Scale, Truth};
@@ -69,7 +70,7 @@ impl Records {
 }
 
 /// Records one scan as the receiver of a sensor gets it: the log of its shots, and the record of its
-/// readout, which is ticks, samples, histograms, taps or beats. Nothing of the scene is in it.
+/// readout. Nothing of the scene is in it.
 ///
 /// A scan comes in bands of about 3400 shots. Each has guard shots at both ends, whose light overlaps
 /// with that of its `owned` ones: they are decoded as well, and their returns dropped.
@@ -111,8 +112,8 @@ pub fn record(
     Ok(Records { design, scene, seed, left: Mutex::new(left) })
 }
 
-/// Decodes ticks, samples, histograms, taps or beats, from a simulation or from hardware, with no scene: out of
-/// arrays, or out of files as `macropulse decode` does.
+/// Decodes a record, from a simulation or from hardware, with no scene: out of arrays, or out of files as
+/// `macropulse decode` does.
 ///
 /// Args:
 ///     sensor: A `Sensor`, the name of a ready one, or a TOML file: its code, timing and receiver.
@@ -219,8 +220,9 @@ fn receiver(
 fn paths(shots: &Bound<'_, PyAny>, ticks: &Bound<'_, PyAny>) -> PyResult<[PathBuf; 2]> {
     match (shots.extract(), ticks.extract()) {
         (Ok(shots), Ok(ticks)) => Ok([shots, ticks]),
-        _ => Err(wrong(
-            "shots and ticks, samples, histograms, taps or beats: give two dictionaries of columns, or the paths of two files",
-        )),
+        _ => Err(wrong(format!(
+            "shots and {}: give two dictionaries of columns, or the paths of two files",
+            RecordKind::listed("or")
+        ))),
     }
 }

@@ -53,7 +53,7 @@ impl Stage {
         let Some((cloud, score, tally)) = made.or_raise()? else {
             return Err(Fault::new_err("the scan was stopped, and by no signal"));
         };
-        if let Some(reason) = tally.where_all_was_lost() {
+        if let Some(reason) = tally.where_all_was_lost(&self.design) {
             warned(py, format!("{}: not a single point: {reason}", self.design.name))?;
         }
         let scene = &self.scene;

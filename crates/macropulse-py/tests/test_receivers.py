@@ -107,7 +107,7 @@ def test_histograms_decode_to_the_points_of_the_simulation(tmp_path):
         return str(raised.value)
 
     assert "1 dimensions" in told(counts=counts.ravel())
-    assert "bins of 1000 fs" in told(bin_fs=1000)
+    assert "bin_fs is 1000, and 1000000 of" in told(bin_fs=1000)
     assert "cycles" in told(cycles=[1, 2])
     assert "did you mean `counts`" in told(count=counts)
 

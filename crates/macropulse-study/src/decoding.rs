@@ -8,8 +8,7 @@ use std::path::Path;
 
 use macropulse::codec::decode::{self, Returns};
 use macropulse::codec::files::{
-    self, BeatReader, Digest, HistogramReader, SampleReader, ShotHeader, ShotReader, Stream,
-    TapReader, TickReader, What,
+    self, Digest, RecordReader, SampleReader, ShotHeader, ShotReader, Stream, TickReader, What,
 };
 use macropulse::codec::{Given, RecordKind, ShotLog};
 use macropulse::design::Design;
@@ -156,18 +155,10 @@ impl Decoding {
             let samples = SampleReader::new(record.bytes, &wanted).map_err(invalid)?;
             let digest = samples.header().digest;
             (Stream::of_samples(cut, shots, samples), digest)
-        } else if let Some(wanted) = design.histogram_header() {
-            let histograms = HistogramReader::new(record.bytes, &wanted).map_err(invalid)?;
-            let digest = histograms.header().digest;
-            (Stream::of_histograms(cut, shots, histograms), digest)
-        } else if let Some(wanted) = design.tap_header() {
-            let taps = TapReader::new(record.bytes, &wanted).map_err(invalid)?;
-            let digest = taps.header().digest;
-            (Stream::of_taps(cut, shots, taps), digest)
-        } else if let Some(wanted) = design.beat_header() {
-            let beats = BeatReader::new(record.bytes, &wanted).map_err(invalid)?;
-            let digest = beats.header().digest;
-            (Stream::of_beats(cut, shots, beats), digest)
+        } else if let Some(wanted) = design.blank_record().as_ref().and_then(Given::of_shots) {
+            let records = RecordReader::new(record.bytes, wanted).map_err(invalid)?;
+            let digest = records.header().digest;
+            (Stream::of_records(cut, shots, records), digest)
         } else {
             let tick_fs = design.clock.tick_fs;
             let ticks = TickReader::new(record.bytes, tick_fs, channels).map_err(invalid)?;

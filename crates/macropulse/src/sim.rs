@@ -397,16 +397,8 @@ pub struct Tally {
     pub interferer_shots: u64,
     /// Detection events.
     pub detections: u64,
-    /// Ticks that reached the decoder.
-    pub ticks: u64,
-    /// Samples that reached it.
-    pub samples: u64,
-    /// Counts in the histograms that reached it.
-    pub counts: u64,
-    /// Taps that reached it.
-    pub taps: u64,
-    /// Peaks of spectra that reached it.
-    pub peaks: u64,
+    /// Things counted in the records that reached the receiver, as [`RecordKind::counted`] names them.
+    pub recorded: u64,
     /// Detection events that fell into the tick of another one.
     pub merged: u64,
     /// Detection events that found every converter busy.
@@ -437,11 +429,7 @@ impl Tally {
             (&mut self.echoes, other.echoes),
             (&mut self.interferer_shots, other.interferer_shots),
             (&mut self.detections, other.detections),
-            (&mut self.ticks, other.ticks),
-            (&mut self.samples, other.samples),
-            (&mut self.counts, other.counts),
-            (&mut self.taps, other.taps),
-            (&mut self.peaks, other.peaks),
+            (&mut self.recorded, other.recorded),
             (&mut self.merged, other.merged),
             (&mut self.lost, other.lost),
             (&mut self.returns, other.returns),
@@ -453,9 +441,9 @@ impl Tally {
         self.seconds.iter_mut().zip(other.seconds).for_each(|(sum, more)| *sum += more);
     }
 
-    /// The first stage after which nothing was left, said as a sentence; `None` if there are
+    /// The first stage of a run of `design` after which nothing was left, said as a sentence; `None` if there are
     /// returns.
-    pub fn where_all_was_lost(&self) -> Option<&'static str> {
+    pub fn where_all_was_lost(&self, design: &Design) -> Option<&'static str> {
         match self {
             _ if self.returns > 0 => None,
             _ if self.surfaces == 0 => Some(
@@ -465,27 +453,11 @@ impl Tally {
                 "every surface met is black at this wavelength, or no longer in the field of the \
                  receiver when its light comes",
             ),
-            _ if self.samples > 0 => Some(
-                "the receiver found none of the echoes in the samples: too little light for the noise, or \
-                 the channel was blind with its own light",
-            ),
-            _ if self.counts > 0 => Some(
-                "the receiver found none of the echoes in the histograms: too little light for the \
-                 background",
-            ),
-            _ if self.taps > 0 => Some(
-                "the receiver found none of the echoes in the taps: too little light for the noise, or so much \
-                 that the taps are full",
-            ),
-            _ if self.peaks > 0 => Some(
-                "the receiver found none of the echoes in the peaks of the spectra: too little light for the noise, or \
-                 a laser whose line is too broad",
-            ),
+            _ if self.recorded > 0 => Some(design.readout.why_nothing_is_found()),
             _ if self.detections == 0 => {
                 Some("the detector saw none of the echoes: too little light for its sensitivity")
             }
-            _ if self.ticks == 0 => Some("every detection event found all converters busy"),
-            _ => Some("the receiver decoded none of the macropulses; the rejects say why"),
+            _ => Some("every detection event found all converters busy"),
         }
     }
 }

@@ -155,7 +155,7 @@ fn full_taps_give_nothing() {
     let design = camera(&[("scan.min_range_m", "0.1")]);
     let scan = sim::scan(&design, &sphere(0.15, 0.9, "night"), 1, 0).unwrap();
     assert_eq!(scan.tally.returns, 0);
-    assert!(scan.tally.where_all_was_lost().unwrap().contains("taps are full"));
+    assert!(scan.tally.where_all_was_lost(&design).unwrap().contains("taps are full"));
     let night = Environment::named("night").unwrap();
     let forecast = |range| Forecaster::new(&design, &night).unwrap().forecast(0.9, range).pd;
     assert!(forecast(0.15) < 1e-9 && forecast(1.5) > 0.999);

@@ -1,4 +1,4 @@
-//! `macropulse decode`: points out of recorded shots and ticks, samples or histograms, without a scene.
+//! `macropulse decode`: points out of recorded shots and their record, without a scene.
 
 mod input;
 mod run;
@@ -25,7 +25,7 @@ use crate::simulate::scenario::files_of_scan;
 use crate::text::{print, print_json};
 use run::{Run, Setting, Sink};
 
-/// Decode recorded shots and ticks, samples or histograms, into points
+/// Decode recorded shots and their record, as ticks, into points
 ///
 /// They come from `simulate --format ticks`, `samples` or `histograms`, from `encode`, or from hardware: docs/formats.md
 /// says how they are written. The points are those that `simulate` gives, to the byte. A folder gets manifest.json

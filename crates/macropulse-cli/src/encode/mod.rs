@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap_complete::engine::ArgValueCompleter;
+use macropulse::codec::RecordKind;
 use macropulse::codec::files::Form;
 use macropulse::design::Design;
 use macropulse_study::sent::Macropulse;
@@ -85,7 +86,11 @@ pub fn run(options: &Encode, common: &Common) -> Result<(), Fault> {
     let design = input::design(sensor, &options.changes.of_sensor()?)?;
     if let Some(output) = &options.output {
         let form = options.format.unwrap_or(Form::Binary);
-        let recorded = Recorded { design: &design, number: options.scan, kept: Kept::Ticks(form) };
+        let recorded = Recorded {
+            design: &design,
+            number: options.scan,
+            kept: Kept { kind: RecordKind::Ticks, form },
+        };
         let is_told = !common.quiet || options.json;
         if output == Path::new(STREAM) {
             return match options.wall_m.is_some() || options.json {

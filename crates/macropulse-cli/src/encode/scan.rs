@@ -110,7 +110,7 @@ pub fn write(
 /// Writes the ticks of an echo of every shot from `range`; gives how many.
 fn write_wall(recorded: Recorded, range: f64, file: &mut WholeFile) -> io::Result<u64> {
     let Recorded { design, number, kept } = recorded;
-    let form = kept.form();
+    let form = kept.form;
     let mut header = recorded.header(false, 0);
     let mut writer = TickWriter::new(&mut *file, form, &header)?;
     let mut count = 0;

@@ -147,7 +147,7 @@ impl Simulate {
         };
         if let Some(formats) = &self.format {
             scenario.formats.clone_from(&formats.0);
-            scenario.records = formats.1;
+            scenario.records.clone_from(&formats.1);
         }
         for design in &scenario.designs {
             let asked = scenario.records.of(design);

@@ -1,15 +1,15 @@
-//! Shots and their record, ticks, samples, histograms, taps or beats, beside the points: what `decode` needs to find them again.
+//! Shots and their record beside the points, as `decode` needs them to find the points again.
 
 use std::collections::BTreeMap;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use macropulse::codec;
 use macropulse::codec::files::{
-    BeatHeader, BeatWriter, Form, HistogramHeader, HistogramWriter, SampleHeader, SampleWriter,
-    Shot, ShotHeader, ShotWriter, TapHeader, TapWriter, TickHeader, TickWriter,
+    Form, RecordHeader, RecordWriter, SampleHeader, SampleWriter, Shot, ShotHeader, ShotWriter,
+    TickHeader, TickWriter,
 };
+use macropulse::codec::{self, Given, RecordKind};
 use macropulse::design::Design;
 use macropulse::emit::{logs, scan_begins_fs, shots_of_scan};
 use macropulse::formats::{self, WholeFile};
@@ -20,39 +20,22 @@ use crate::fault::Fault;
 
 /// Record of a sensor that is written beside its shots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kept {
-    /// Ticks; they and the shots in this form.
-    Ticks(Form),
-    /// Samples; they and the shots in their binary form.
-    Samples,
-    /// Histograms; they and the shots in their binary form.
-    Histograms,
-    /// Taps; they and the shots in their binary form.
-    Taps,
-    /// Beats; they and the shots in their binary form.
-    Beats,
+pub struct Kept {
+    /// Its kind.
+    pub kind: RecordKind,
+    /// The form of the shots, and of ticks.
+    pub form: Form,
 }
 
 impl Kept {
-    /// The form of the shots.
-    pub fn form(self) -> Form {
-        match self {
-            Self::Ticks(form) => form,
-            _ => Form::Binary,
-        }
-    }
-
     /// The names of the files of a scan: shots, and their record.
     pub fn names(self, scan: u64) -> [String; 2] {
-        let [shots, record] = match self {
-            Self::Ticks(Form::Binary) => [("shots", "mps"), ("ticks", "mpt")],
-            Self::Ticks(Form::Text) => [("shots", "csv"), ("ticks", "csv")],
-            Self::Samples => [("shots", "mps"), ("samples", "mpw")],
-            Self::Histograms => [("shots", "mps"), ("histograms", "mph")],
-            Self::Taps => [("shots", "mps"), ("taps", "mpa")],
-            Self::Beats => [("shots", "mps"), ("beats", "mpb")],
+        let endings = match self.form {
+            Form::Binary => ["mps", self.kind.ending()],
+            Form::Text => ["csv", "csv"],
         };
-        [shots, record].map(|(name, ending)| format!("{name}-{scan:06}.{ending}"))
+        [("shots", endings[0]), (self.kind.name(), endings[1])]
+            .map(|(name, ending)| format!("{name}-{scan:06}.{ending}"))
     }
 }
 
@@ -88,7 +71,7 @@ impl Recorded<'_> {
             turn,
             count: Some(shots.end - shots.start),
         };
-        let mut writer = ShotWriter::new(out, kept.form(), &header)?;
+        let mut writer = ShotWriter::new(out, kept.form, &header)?;
         for log in logs(design, shots) {
             for at in 0..log.len() {
                 writer.write(&Shot {
@@ -120,13 +103,11 @@ impl Recorded<'_> {
 enum Header {
     Ticks(TickHeader, Form),
     Samples(SampleHeader),
-    Histograms(HistogramHeader),
-    Taps(TapHeader),
-    Beats(BeatHeader),
+    Records(Given, RecordHeader),
 }
 
 impl Header {
-    /// Writes it, with `count` ticks, blocks of samples, histograms or shots with taps or beats to come.
+    /// Writes it, with `count` ticks, blocks of samples, or shots to come.
     fn write(&mut self, out: &mut WholeFile, count: u64) -> io::Result<()> {
         match self {
             Self::Ticks(header, form) => {
@@ -137,23 +118,16 @@ impl Header {
                 header.count = Some(count);
                 SampleWriter::new(out, header).map(|_| ())
             }
-            Self::Histograms(header) => {
+            Self::Records(blank, header) => {
                 header.count = Some(count);
-                HistogramWriter::new(out, header).map(|_| ())
-            }
-            Self::Taps(header) => {
-                header.count = Some(count);
-                TapWriter::new(out, header).map(|_| ())
-            }
-            Self::Beats(header) => {
-                header.count = Some(count);
-                BeatWriter::new(out, header).map(|_| ())
+                let Some(blank) = blank.of_shots() else { return Ok(()) };
+                RecordWriter::new(out, blank, header).map(|_| ())
             }
         }
     }
 
     /// Appends what was recorded before the absolute tick `end` to `bytes`, and gives the number of ticks,
-    /// blocks of samples, histograms, or shots with taps or beats.
+    /// blocks of samples, or shots.
     fn append(&self, record: &Record, end: i64, bytes: &mut Vec<u8>) -> io::Result<u64> {
         match (self, record.given) {
             (Self::Ticks(header, form), codec::Record::Ticks(ticks)) => {
@@ -166,23 +140,13 @@ impl Header {
             (Self::Samples(_), codec::Record::Samples(samples)) => {
                 SampleWriter::behind(bytes).write(samples, end)
             }
-            (Self::Histograms(_), codec::Record::Histograms(histograms)) => {
+            (_, given) => {
+                // A sensor gives what it is asked for, or it is not asked.
+                let Some(of_shots) = given.of_shots() else { return Ok(0) };
                 let first = record.log.first + record.log.owned.start as u64;
-                HistogramWriter::behind(bytes).write(histograms, first)?;
-                Ok(histograms.len() as u64)
+                RecordWriter::behind(bytes).write(of_shots, first)?;
+                Ok(of_shots.shots() as u64)
             }
-            (Self::Taps(header), codec::Record::Taps(taps)) => {
-                let first = record.log.first + record.log.owned.start as u64;
-                TapWriter::behind(bytes).write(taps, first)?;
-                Ok((taps.codes.len() / header.taps.max(1) as usize) as u64)
-            }
-            (Self::Beats(_), codec::Record::Beats(beats)) => {
-                let first = record.log.first + record.log.owned.start as u64;
-                BeatWriter::behind(bytes).write(beats, first)?;
-                Ok(record.log.owned.len() as u64)
-            }
-            // A sensor gives what it is asked for, or it is not asked.
-            _ => Ok(0),
         }
     }
 }
@@ -220,12 +184,12 @@ impl<'a> RecordFiles<'a> {
         let written = recorded.write_shots(&mut shots, (pose.position, pose.rotation.quaternion()));
         written.map_err(|cause| shots.failed(cause))?;
         let design = recorded.design;
+        let digest = Some(design.recorded_digest());
+        let records = |blank| Header::Records(blank, RecordHeader { digest, count: None });
         let samples = design.sample_header().map(Header::Samples);
-        let histograms = design.histogram_header().map(Header::Histograms);
-        let taps = design.tap_header().map(Header::Taps);
-        let beats = design.beat_header().map(Header::Beats);
-        let mut header = samples.or(histograms).or(taps).or(beats).unwrap_or_else(|| {
-            Header::Ticks(recorded.header(scans.measure(), 0), recorded.kept.form())
+        let of_shots = || design.blank_record().map(records);
+        let mut header = samples.or_else(of_shots).unwrap_or_else(|| {
+            Header::Ticks(recorded.header(scans.measure(), 0), recorded.kept.form)
         });
         header.write(&mut file, 0).map_err(|cause| file.failed(cause))?;
         let waiting = Waiting { file, next: 0, early: BTreeMap::new(), count: 0, failed: None };

@@ -227,7 +227,7 @@ impl<'a> Run<'a> {
             wrong.push(format!("stopped by Ctrl-C after {} of {wanted} scans", self.scans));
         }
         if self.scans > 0
-            && let Some(reason) = self.tally.where_all_was_lost()
+            && let Some(reason) = self.tally.where_all_was_lost(self.design)
         {
             wrong.push(format!("not a single point: {reason}"));
         }

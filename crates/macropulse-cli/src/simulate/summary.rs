@@ -91,18 +91,11 @@ impl Run<'_> {
 
     fn light(&self) -> String {
         let tally = &self.tally;
-        let recorded = match self.design.records() {
-            RecordKind::Samples => counted(tally.samples, "sample"),
-            RecordKind::Histograms => counted(tally.counts, "count"),
-            RecordKind::Taps => counted(tally.taps, "tap"),
-            RecordKind::Beats => counted(tally.peaks, "peak"),
-            RecordKind::Ticks => {
-                format!(
-                    "{}, {}",
-                    counted(tally.detections, "detection"),
-                    counted(tally.ticks, "tick")
-                )
-            }
+        let record = self.design.records();
+        let recorded = counted(tally.recorded, record.counted());
+        let recorded = match record {
+            RecordKind::Ticks => format!("{}, {recorded}", counted(tally.detections, "detection")),
+            _ => recorded,
         };
         let surfaces = counted(tally.surfaces, "surface");
         format!("{surfaces} met, {}, {recorded}", counted(tally.echoes, "echo"))

@@ -33,7 +33,7 @@ pub(super) fn check(
     match record {
         Record::Ticks(ticks) => of_ticks(receiver, ticks)?,
         Record::Samples(samples) => of_samples(samples)?,
-        Record::Histograms(_) | Record::Taps(_) | Record::Beats(_) => {}
+        _ => {}
     }
     in_codebook(log, codebook)?;
     in_time(receiver, (codebook, log), record)
@@ -231,7 +231,7 @@ fn in_time(
     let (epoch, is_dark) = match record {
         Record::Ticks(ticks) => (ticks.epoch, ticks.tick.is_empty()),
         Record::Samples(samples) => (samples.epoch, samples.is_empty()),
-        Record::Histograms(_) | Record::Taps(_) | Record::Beats(_) => (0, true),
+        _ => (0, true),
     };
     let ends = [log.fired_at_fs.first(), log.fired_at_fs.last()];
     for (shot, fired_at_fs) in [0, log.len().wrapping_sub(1)].into_iter().zip(ends) {

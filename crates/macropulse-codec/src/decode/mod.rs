@@ -121,10 +121,10 @@ impl Default for Correlation {
     }
 }
 
-/// The list of all kinds of receivers: variant, method, name, and returns of a shot at most. Sensor
-/// files and their schema, the command line and the Python package take the names from here.
+/// The list of all kinds of receivers: variant, method, name, the record that it decodes, and returns of a shot at
+/// most. Sensor files and their schema, the command line and the Python package take the names from here.
 macro_rules! kinds {
-    ($($(#[doc = $doc:literal])+ $Kind:ident, $method:pat => $name:literal, $returns:expr;)+) => {
+    ($($(#[doc = $doc:literal])+ $Kind:ident, $method:pat => $name:literal, $Record:ident, $returns:expr;)+) => {
         /// The name of a receiver.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
         #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -150,6 +150,13 @@ macro_rules! kinds {
                 }
             }
 
+            /// The kind of record that it decodes.
+            pub fn record(self) -> RecordKind {
+                match self {
+                    $(Self::$Kind => RecordKind::$Record,)+
+                }
+            }
+
             /// Returns of a shot that it can give at most.
             pub fn most_returns(self) -> u8 {
                 match self {
@@ -171,36 +178,23 @@ macro_rules! kinds {
 
 kinds! {
     /// As the paper prints it: bit by bit from the first light on.
-    Literal, Self::Bitwise(Bitwise { opening: Opening::FirstBit, .. }) => "literal", 1;
+    Literal, Self::Bitwise(Bitwise { opening: Opening::FirstBit, .. }) => "literal", Ticks, 1;
     /// Bit by bit, but tries how many leading zero bits were dark.
-    Blind, Self::Bitwise(Bitwise { opening: Opening::AnyBit, .. }) => "blind", 1;
+    Blind, Self::Bitwise(Bitwise { opening: Opening::AnyBit, .. }) => "blind", Ticks, 1;
     /// Correlates the whole known macropulse of every shot in flight.
-    Matched, Self::Matched(..) => "matched", matched::MOST_RETURNS;
+    Matched, Self::Matched(..) => "matched", Ticks, matched::MOST_RETURNS;
     /// As `matched`, but light on dark chips counts against it; for words with about half of their chips lit.
-    Balanced, Self::Balanced(_) => "balanced", 1;
+    Balanced, Self::Balanced(_) => "balanced", Ticks, 1;
     /// For shots without a code: the ticks in the range gate.
-    Direct, Self::Direct => "direct", MOST_RETURNS;
+    Direct, Self::Direct => "direct", Ticks, MOST_RETURNS;
     /// As `matched`, of a sampled detector: adds up the samples of the marks of every shot in flight.
-    Sampled, Self::Sampled(_) => "sampled", MOST_RETURNS;
+    Sampled, Self::Sampled(_) => "sampled", Samples, MOST_RETURNS;
     /// For bursts of pulses that are counted in a histogram: the pulses that stand out of its background.
-    Histogram, Self::Histogram(_) => "histogram", MOST_RETURNS;
+    Histogram, Self::Histogram(_) => "histogram", Histograms, MOST_RETURNS;
     /// For modulated light: the phase of each modulation frequency, and the range that has all of them.
-    Phase, Self::Phase(_) => "phase", 1;
+    Phase, Self::Phase(_) => "phase", Taps, 1;
     /// For light whose frequency is modulated: the range and the radial velocity that the beats of both ramps have.
-    Beat, Self::Beat(_) => "beat", MOST_RETURNS;
-}
-
-impl ReceiverKind {
-    /// The kind of record that it decodes.
-    pub fn record(self) -> RecordKind {
-        match self {
-            Self::Sampled => RecordKind::Samples,
-            Self::Histogram => RecordKind::Histograms,
-            Self::Phase => RecordKind::Taps,
-            Self::Beat => RecordKind::Beats,
-            _ => RecordKind::Ticks,
-        }
-    }
+    Beat, Self::Beat(_) => "beat", Beats, MOST_RETURNS;
 }
 
 impl Method {
@@ -228,10 +222,9 @@ impl Method {
     /// Ticks per chip of the code words; `None` without a code.
     pub fn ticks_per_chip(&self) -> Option<u32> {
         match self {
-            Self::Direct | Self::Histogram(_) | Self::Phase(_) | Self::Beat(_) => None,
             Self::Bitwise(settings) => Some(settings.ticks_per_chip),
-            Self::Matched(settings, _) | Self::Balanced(settings) => Some(settings.ticks_per_chip),
             Self::Sampled(settings) => Some(settings.ticks_per_chip),
+            _ => self.correlation().map(|correlation| correlation.ticks_per_chip),
         }
     }
 
@@ -342,7 +335,9 @@ impl Receiver {
         let record = record.into();
         check::check(self, (codebook, log), record)?;
         match (record, &self.method) {
-            (Record::Ticks(ticks), _) => self.decode_ticks(codebook, log, ticks),
+            (Record::Ticks(ticks), method) if method.record() == RecordKind::Ticks => {
+                self.decode_ticks(codebook, log, ticks)
+            }
             (Record::Samples(samples), Method::Sampled(_)) if samples.is_empty() => {
                 Ok(self.nothing_of(log.owned.len()))
             }
@@ -371,10 +366,6 @@ impl Receiver {
     ) -> Result<Returns, Error> {
         let sent = (codebook, log);
         Ok(match &self.method {
-            method @ (Method::Sampled(_)
-            | Method::Histogram(_)
-            | Method::Phase(_)
-            | Method::Beat(_)) => return Err(wrong(method, RecordKind::Ticks)),
             _ if ticks.tick.is_empty() || log.is_empty() => {
                 check::in_order(&ticks.tick, 0..ticks.tick.len())?;
                 self.nothing_of(log.owned.len())
@@ -386,6 +377,7 @@ impl Receiver {
                 matched::decode(self, settings, *effort, sent, ticks)?
             }
             Method::Balanced(settings) => balanced::decode(self, settings, sent, ticks),
+            method => return Err(wrong(method, RecordKind::Ticks)),
         })
     }
 

@@ -4,11 +4,10 @@ use std::collections::VecDeque;
 use std::io::Read;
 use std::ops::Range;
 
-use super::{
-    BeatReader, Error, Histogram, HistogramReader, SampleBlock, SampleReader, TapReader, TickReader,
-};
+use super::records::RecordsAtHand;
+use super::{Error, SampleBlock, SampleReader, TickReader};
 use crate::ticks::{Tick, Ticks};
-use crate::{Beats, Given, Histograms, Peak, Samples, Taps};
+use crate::{Given, Samples};
 
 /// Ticks of a band at most: 400 MB of them.
 const MOST_TICKS: usize = 1 << 24;
@@ -16,23 +15,17 @@ const MOST_TICKS: usize = 1 << 24;
 /// Samples of a band at most: 512 MB of them.
 const MOST_SAMPLES: usize = 1 << 28;
 
-/// Counts, taps or peaks of a band at most: a gigabyte of them.
-const MOST_COUNTS: usize = 1 << 27;
-
 /// A record under way.
 #[derive(Debug)]
 pub(super) enum AtHand<R> {
     Ticks(TicksAtHand<R>),
     Samples(SamplesAtHand<R>),
-    Histograms(EachShot<HistogramReader<R>, Histogram>),
-    Taps(EachShot<TapReader<R>, Vec<u16>>),
-    Beats(EachShot<BeatReader<R>, Vec<Peak>>),
+    Records(RecordsAtHand<R>),
 }
 
 impl<R: Read> AtHand<R> {
-    /// Returns the record of the shots with the ids `owned`: their histograms, taps or beats, or the ticks or
-    /// samples of the absolute ticks of `span`. A span never begins before the one asked for last. Times of
-    /// ticks are counted from `epoch` on.
+    /// Returns the record of the shots with the ids `owned`, or the ticks or samples of the absolute ticks of `span`.
+    /// A span never begins before the one asked for last. Times of ticks are counted from `epoch` on.
     pub fn of(
         &mut self,
         owned: &Range<u64>,
@@ -40,9 +33,7 @@ impl<R: Read> AtHand<R> {
         epoch: i64,
     ) -> Result<Given, Error> {
         match self {
-            Self::Histograms(histograms) => Ok(Given::Histograms(histograms.of(owned)?)),
-            Self::Taps(taps) => Ok(Given::Taps(taps.of(owned)?)),
-            Self::Beats(beats) => Ok(Given::Beats(beats.of(owned)?)),
+            Self::Records(records) => records.of(owned),
             Self::Ticks(ticks) => Ok(Given::Ticks(ticks.of(span, epoch)?)),
             Self::Samples(samples) => Ok(Given::Samples(samples.of(span)?)),
         }
@@ -50,7 +41,7 @@ impl<R: Read> AtHand<R> {
 
     /// True if it has a record for each shot, and no other.
     pub fn is_by_shot(&self) -> bool {
-        matches!(self, Self::Histograms(_) | Self::Taps(_) | Self::Beats(_))
+        matches!(self, Self::Records(_))
     }
 
     /// Reads to the end, so that what is wrong there is not passed over.
@@ -58,111 +49,9 @@ impl<R: Read> AtHand<R> {
         match self {
             Self::Ticks(ticks) => while ticks.reader.next_tick()?.is_some() {},
             Self::Samples(samples) => while samples.reader.next_block()?.is_some() {},
-            Self::Histograms(histograms) => while histograms.reader.next_histogram()?.is_some() {},
-            Self::Taps(taps) => while taps.reader.next_shot()?.is_some() {},
-            Self::Beats(beats) => while beats.reader.next_shot()?.is_some() {},
+            Self::Records(records) => records.drain()?,
         }
         Ok(())
-    }
-}
-
-/// A file under way that has a record of each shot.
-#[derive(Debug)]
-pub(super) struct EachShot<R, T> {
-    reader: R,
-    /// The one behind those that were asked for, with its shot.
-    next: Option<(u64, T)>,
-}
-
-impl<R, T> EachShot<R, T> {
-    pub fn new(reader: R) -> Self {
-        Self { reader, next: None }
-    }
-
-    /// Gives to `keep` what `read` finds of the shots `owned`, with the place of the shot among them.
-    fn each(
-        &mut self,
-        owned: &Range<u64>,
-        read: impl Fn(&mut R) -> Result<Option<(u64, T)>, Error>,
-        mut keep: impl FnMut(usize, T),
-    ) -> Result<(), Error> {
-        loop {
-            if self.next.is_none() {
-                self.next = read(&mut self.reader)?;
-            }
-            let Some((shot, one)) = self.next.take_if(|(shot, _)| *shot < owned.end) else {
-                return Ok(());
-            };
-            if let Some(at) = shot.checked_sub(owned.start) {
-                keep(at as usize, one);
-            }
-        }
-    }
-}
-
-impl<R: Read> EachShot<HistogramReader<R>, Histogram> {
-    /// The histograms of the shots `owned`: empty of a shot without one.
-    fn of(&mut self, owned: &Range<u64>) -> Result<Histograms, Error> {
-        let header = *self.reader.header();
-        let (shots, bins) = ((owned.end - owned.start) as usize, header.bins as usize);
-        if shots.saturating_mul(bins) > MOST_COUNTS {
-            return self.reader.refuse(format!(
-                "more than {MOST_COUNTS} bins belong to shots that are decoded together"
-            ));
-        }
-        let mut found = Histograms {
-            bin_fs: header.bin_fs,
-            offset_fs: header.offset_fs,
-            bins: header.bins,
-            cycles: vec![0; shots],
-            counts: vec![0; shots * bins],
-        };
-        let read = |reader: &mut HistogramReader<R>| {
-            Ok(reader.next_histogram()?.map(|one| (one.shot, one)))
-        };
-        self.each(owned, read, |at, one| {
-            found.cycles[at] = one.cycles;
-            found.counts[at * bins..(at + 1) * bins].copy_from_slice(&one.counts);
-        })?;
-        Ok(found)
-    }
-}
-
-impl<R: Read> EachShot<TapReader<R>, Vec<u16>> {
-    /// The taps of the shots `owned`: codes of 0 of a shot without any.
-    fn of(&mut self, owned: &Range<u64>) -> Result<Taps, Error> {
-        let taps = self.reader.header().taps;
-        let (shots, each) = ((owned.end - owned.start) as usize, taps as usize);
-        if shots.saturating_mul(each) > MOST_COUNTS {
-            return self.reader.refuse(format!(
-                "more than {MOST_COUNTS} taps belong to shots that are decoded together"
-            ));
-        }
-        let mut found = Taps { taps, codes: vec![0; shots * each] };
-        self.each(owned, TapReader::next_shot, |at, codes| {
-            found.codes[at * each..(at + 1) * each].copy_from_slice(&codes);
-        })?;
-        Ok(found)
-    }
-}
-
-impl<R: Read> EachShot<BeatReader<R>, Vec<Peak>> {
-    /// The peaks of the shots `owned`: none of a shot without any.
-    fn of(&mut self, owned: &Range<u64>) -> Result<Beats, Error> {
-        let header = *self.reader.header();
-        let (shots, each) =
-            ((owned.end - owned.start) as usize, (header.ramps * header.peaks) as usize);
-        if shots.saturating_mul(each) > MOST_COUNTS {
-            return self.reader.refuse(format!(
-                "more than {MOST_COUNTS} peaks belong to shots that are decoded together"
-            ));
-        }
-        let found = vec![Peak::EMPTY; shots * each];
-        let mut beats = Beats { ramps: header.ramps, peaks: header.peaks, found };
-        self.each(owned, BeatReader::next_shot, |at, peaks| {
-            beats.found[at * each..(at + 1) * each].copy_from_slice(&peaks);
-        })?;
-        Ok(beats)
     }
 }
 

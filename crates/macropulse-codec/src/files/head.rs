@@ -2,11 +2,13 @@
 
 use std::io::Read;
 
+use super::records::MAGICS;
 use super::source::{Source, number};
 use super::{Digest, Error, UNKNOWN, VERSION, What};
+use crate::record::RecordKind;
 
 /// Bytes of every binary header.
-pub(super) const HEADER: usize = 128;
+pub const HEADER: usize = 128;
 
 /// The keys in the text of a header, and their values.
 pub(super) struct Keys(Vec<(String, String)>);
@@ -96,20 +98,22 @@ fn finite(text: &str) -> Option<f64> {
 
 fn check_kind<R: Read>(source: &Source<R>, kind: &str) -> Result<(), Error> {
     let name = source.name();
-    match kind {
-        _ if kind == name => Ok(()),
-        "ticks" | "samples" | "histograms" | "taps" | "beats" if source.what != What::Shots => source.refuse(format!(
-            "these are {kind}, where the sensor records {name}: is it the one that they were recorded \
-             with?"
-        )),
-        "shots" | "ticks" | "samples" | "histograms" | "taps" | "beats" => {
-            let behind = if source.what == What::Shots { kind } else { name };
-            source.refuse(format!(
-                "these are {kind}, where {name} are wanted: the shot log comes first, then the {behind}"
-            ))
-        }
-        _ => source.refuse(format!("`{kind}` are neither shots nor ticks, samples, histograms, taps or beats")),
+    if kind == name {
+        return Ok(());
     }
+    let is_record = RecordKind::ALL.iter().any(|known| known.name() == kind);
+    if is_record && source.what != What::Shots {
+        return source.refuse(format!(
+            "these are {kind}, where the sensor records {name}: is it the one that they were recorded with?"
+        ));
+    }
+    if is_record || kind == "shots" {
+        let behind = if source.what == What::Shots { kind } else { name };
+        return source.refuse(format!(
+            "these are {kind}, where {name} are wanted: the shot log comes first, then the {behind}"
+        ));
+    }
+    source.refuse(format!("`{kind}` are neither shots nor {}", RecordKind::listed("or")))
 }
 
 fn check_version<R: Read>(source: &Source<R>, version: &str) -> Result<(), Error> {
@@ -188,18 +192,9 @@ pub(super) fn binary<R: Read>(source: &mut Source<R>) -> Result<[u8; HEADER], Er
     if !source.record(&mut header)? {
         return source.refuse("the header is missing");
     }
-    let kind = match &header[..8] {
-        b"MPSHOTS\0" => "shots",
-        b"MPTICKS\0" => "ticks",
-        b"MPSAMPL\0" => "samples",
-        b"MPHISTO\0" => "histograms",
-        b"MPTAPS\0\0" => "taps",
-        b"MPBEATS\0" => "beats",
-        _ => {
-            return source.refuse(
-                "this is no file of Macropulse's shots, ticks, samples, histograms, taps or beats",
-            );
-        }
+    let Some((_, kind)) = MAGICS.iter().find(|(magic, _)| header.starts_with(*magic)) else {
+        let records = RecordKind::listed("or");
+        return source.refuse(format!("this is no file of Macropulse's shots, {records}"));
     };
     check_kind(source, kind)?;
     check_version(source, &number!(header, 8, u32).to_string())?;

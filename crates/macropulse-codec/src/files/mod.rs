@@ -1,36 +1,37 @@
-//! Shot logs, ticks, samples, histograms, taps and beats as files and streams: the seam at which recorded hardware takes the
-//! place of a simulation.
+//! Shot logs and records as files and streams: the seam at which recorded hardware takes the place of a simulation.
 //!
 //! Shots and ticks have two forms that hold the same. **Text** has lines of comma-separated whole numbers
 //! under a line that says what they are. **Binary** has little-endian records under a header. A reader tells
-//! them apart by their first byte. Samples, histograms, taps and beats are binary. `docs/formats.md` has them
-//! byte by byte.
+//! them apart by their first byte. All other records are binary. `docs/formats.md` has them byte by byte.
 //!
 //! Readers and writers go over any [`Read`](std::io::Read) and [`Write`](std::io::Write), record by record,
 //! and keep none. [`Stream`] reads shots and their record at once and cuts them into bands to be decoded. An
 //! error names the line or the byte that is wrong.
 
 mod at_hand;
-mod beat_files;
-mod by_shot;
+mod beats;
 mod head;
-mod histogram_files;
+mod histograms;
+mod records;
 mod sample_files;
 mod shots;
 mod source;
 mod stream;
-mod tap_files;
+mod taps;
 mod tick_files;
 
 use std::fmt;
 use std::io;
 
-pub use beat_files::{BeatHeader, BeatReader, BeatWriter};
-pub use histogram_files::{Histogram, HistogramHeader, HistogramReader, HistogramWriter};
+use crate::record::RecordKind;
+
+pub use head::HEADER;
+pub use records::{
+    RecordColumn, RecordHeader, RecordReader, RecordValues, RecordWriter, ShotRecord,
+};
 pub use sample_files::{SampleBlock, SampleHeader, SampleReader, SampleWriter};
 pub use shots::{Limits, Shot, ShotHeader, ShotReader, ShotWriter};
 pub use stream::Stream;
-pub use tap_files::{TapHeader, TapReader, TapWriter};
 pub use tick_files::{TickHeader, TickReader, TickWriter};
 
 /// The version of all these files that is written, and the only one that is read.
@@ -94,16 +95,8 @@ impl fmt::Display for Place {
 pub enum What {
     /// The shot log.
     Shots,
-    /// The ticks.
-    Ticks,
-    /// The samples.
-    Samples,
-    /// The histograms.
-    Histograms,
-    /// The taps.
-    Taps,
-    /// The beats.
-    Beats,
+    /// The record beside it.
+    Record(RecordKind),
 }
 
 /// Why a file cannot be read.

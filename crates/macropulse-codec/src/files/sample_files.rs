@@ -9,6 +9,7 @@ use std::io::{self, Read, Write};
 use super::head::{self, HEADER};
 use super::source::{Source, number};
 use super::{Digest, Error, Form, LONGEST_FS, What};
+use crate::record::RecordKind;
 use crate::samples::Samples;
 
 const MAGIC: &[u8; 8] = b"MPSAMPL\0";
@@ -81,7 +82,7 @@ impl<R: Read> SampleReader<R> {
     /// If it cannot be read, is of no version that is known, or is of another sensor. Samples of another
     /// sensor have another rate, another number of channels, other codes or another step.
     pub fn new(reader: R, wanted: &SampleHeader) -> Result<Self, Error> {
-        let mut source = Source::new(reader, What::Samples)?;
+        let mut source = Source::new(reader, What::Record(RecordKind::Samples))?;
         if source.form == Form::Text {
             return source.refuse("is text: samples are read in their binary form alone");
         }

@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 
 use super::{Error, Form, Place, What};
+use crate::record::RecordKind;
 
 /// No line is longer, bytes.
 const LONGEST_LINE: u64 = 4096;
@@ -43,7 +44,7 @@ impl<R: Read> Source<R> {
         let source = Self { bytes, form, what, place, passed: 0, line: Vec::new() };
         match first {
             Some(b'#' | b'M') => Ok(source),
-            Some(_) if !matches!(what, What::Shots | What::Ticks) => {
+            Some(_) if !matches!(what, What::Shots | What::Record(RecordKind::Ticks)) => {
                 let name = source.name();
                 source.refuse(format!("this is no file of Macropulse's {name}"))
             }
@@ -59,11 +60,7 @@ impl<R: Read> Source<R> {
     pub fn name(&self) -> &'static str {
         match self.what {
             What::Shots => "shots",
-            What::Ticks => "ticks",
-            What::Samples => "samples",
-            What::Histograms => "histograms",
-            What::Taps => "taps",
-            What::Beats => "beats",
+            What::Record(kind) => kind.name(),
         }
     }
 

@@ -4,10 +4,9 @@
 use std::io::Read;
 use std::ops::Range;
 
-use super::at_hand::{AtHand, EachShot, SamplesAtHand, TicksAtHand};
-use super::{
-    BeatReader, Error, HistogramReader, SampleReader, Shot, ShotReader, TapReader, TickReader,
-};
+use super::at_hand::{AtHand, SamplesAtHand, TicksAtHand};
+use super::records::RecordsAtHand;
+use super::{Error, RecordReader, SampleReader, Shot, ShotReader, TickReader};
 use crate::Given;
 use crate::cut::Cut;
 use crate::shot_log::ShotLog;
@@ -41,19 +40,9 @@ impl<S: Read, R: Read> Stream<S, R> {
         Self::of(cut, shots, AtHand::Samples(SamplesAtHand::new(samples)))
     }
 
-    /// The bands of `shots` and `histograms`, which are of a sensor that is `cut` so.
-    pub fn of_histograms(cut: Cut, shots: ShotReader<S>, histograms: HistogramReader<R>) -> Self {
-        Self::of(cut, shots, AtHand::Histograms(EachShot::new(histograms)))
-    }
-
-    /// The bands of `shots` and `taps`, which are of a sensor that is `cut` so.
-    pub fn of_taps(cut: Cut, shots: ShotReader<S>, taps: TapReader<R>) -> Self {
-        Self::of(cut, shots, AtHand::Taps(EachShot::new(taps)))
-    }
-
-    /// The bands of `shots` and `beats`, which are of a sensor that is `cut` so.
-    pub fn of_beats(cut: Cut, shots: ShotReader<S>, beats: BeatReader<R>) -> Self {
-        Self::of(cut, shots, AtHand::Beats(EachShot::new(beats)))
+    /// The bands of `shots` and their `records`, which are of a sensor that is `cut` so.
+    pub fn of_records(cut: Cut, shots: ShotReader<S>, records: RecordReader<R>) -> Self {
+        Self::of(cut, shots, AtHand::Records(RecordsAtHand::new(records)))
     }
 
     fn of(cut: Cut, shots: ShotReader<S>, record: AtHand<R>) -> Self {

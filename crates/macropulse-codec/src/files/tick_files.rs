@@ -5,6 +5,7 @@ use std::io::{self, Read, Write};
 use super::head::{self, Columns, HEADER, Keys};
 use super::source::{Source, number};
 use super::{Digest, Error, Form, LONGEST_FS, VERSION, What};
+use crate::record::RecordKind;
 use crate::ticks::Tick;
 
 const MAGIC: &[u8; 8] = b"MPTICKS\0";
@@ -50,7 +51,7 @@ impl<R: Read> TickReader<R> {
     /// If it cannot be read, is of no version that is known, or of another sensor: ticks of another
     /// length, or without a channel where there are several.
     pub fn new(reader: R, tick_fs: i64, channels: u32) -> Result<Self, Error> {
-        let mut source = Source::new(reader, What::Ticks)?;
+        let mut source = Source::new(reader, What::Record(RecordKind::Ticks))?;
         let (header, columns) = match source.form {
             Form::Text => read_text(&mut source, tick_fs)?,
             Form::Binary => (read_binary(&mut source)?, Columns::default()),

@@ -84,7 +84,7 @@ pub(super) fn trial(
     files.push(record::PAGE.to_owned());
     let writing = writing.elapsed().as_secs_f64();
     let warnings: Vec<String> =
-        scan.tally.where_all_was_lost().map(str::to_owned).into_iter().collect();
+        scan.tally.where_all_was_lost(design).map(str::to_owned).into_iter().collect();
     let run = record::Run {
         state: State::Finished,
         design,

@@ -213,16 +213,12 @@ pub fn manifest(run: &Run) -> Manifest {
     ] {
         manifest.counts.push(name, count);
     }
-    let recorded = match design.records() {
-        RecordKind::Samples => &[("samples", tally.samples)][..],
-        RecordKind::Ticks => &[("detections", tally.detections), ("ticks", tally.ticks)],
-        RecordKind::Histograms => &[("counts", tally.counts)],
-        RecordKind::Taps => &[("taps", tally.taps)],
-        RecordKind::Beats => &[("peaks", tally.peaks)],
-    };
-    for (name, count) in recorded.iter().chain(&[("returns", tally.returns)]) {
-        manifest.counts.push(*name, *count);
+    let record = design.records();
+    if record == RecordKind::Ticks {
+        manifest.counts.push("detections", tally.detections);
     }
+    manifest.counts.push(format!("{}s", record.counted()), tally.recorded);
+    manifest.counts.push("returns", tally.returns);
     for number in 1..=design.receiver.returns {
         let count = tally.by_number[usize::from(number) - 1];
         if design.receiver.returns > 1 {

@@ -97,7 +97,7 @@ impl Job<'_> {
             lost: scan.tally.lost,
             peak_busy: scan.tally.peak_busy,
             right: RangeError::of_spread(&scan.cloud(), design.right_within),
-            empty: scan.tally.where_all_was_lost().map(str::to_owned),
+            empty: scan.tally.where_all_was_lost(&design).map(str::to_owned),
         }))
     }
 

@@ -4,7 +4,7 @@
 //! echoes must fit in.
 
 use super::Design;
-use macropulse_codec::{Cut, RecordKind};
+use macropulse_codec::Cut;
 
 use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
 
@@ -40,11 +40,9 @@ impl Design {
     pub fn cut(&self) -> Cut {
         let jitter_fs = self.most_jitter_fs();
         // Light is looked for to twice the gate: what arrives in it is that of shots the receiver knows. A
-        // histogram, taps or beats have the light of their own shot, and nothing before it.
-        let lead_fs = match self.records() {
-            RecordKind::Ticks | RecordKind::Samples => 2 * self.listening_fs() + jitter_fs,
-            RecordKind::Histograms | RecordKind::Taps | RecordKind::Beats => 0,
-        };
+        // record made shot by shot has the light of its own shot, and nothing before it.
+        let is_by_shot = self.records().is_by_shot();
+        let lead_fs = if is_by_shot { 0 } else { 2 * self.listening_fs() + jitter_fs };
         let model = self.detector.model();
         let under_way_fs = self.light_fs() + jitter_fs + model.settles_fs();
         Cut {

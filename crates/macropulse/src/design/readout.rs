@@ -99,6 +99,29 @@ impl Readout {
         }
     }
 
+    /// Why a receiver finds nothing in its record of light, in a sentence.
+    pub fn why_nothing_is_found(&self) -> &'static str {
+        match self {
+            Self::Tdc(_) => "the receiver decoded none of the macropulses; the rejects say why",
+            Self::Adc => {
+                "the receiver found none of the echoes in the samples: too little light for the noise, or \
+                 the channel was blind with its own light"
+            }
+            Self::Histogram(_) => {
+                "the receiver found none of the echoes in the histograms: too little light for the \
+                 background"
+            }
+            Self::Taps => {
+                "the receiver found none of the echoes in the taps: too little light for the noise, or so much \
+                 that the taps are full"
+            }
+            Self::Spectrum(_) => {
+                "the receiver found none of the echoes in the peaks of the spectra: too little light for the noise, or \
+                 a laser whose line is too broad"
+            }
+        }
+    }
+
     /// Time, fs, for which its state depends on the events that it was given.
     pub(super) fn memory_fs(&self) -> i64 {
         self.tdc().map_or(0, Tdc::memory_fs)

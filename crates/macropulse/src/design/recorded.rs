@@ -1,13 +1,11 @@
 //! Properties of a design by which recorded shots, ticks and samples are checked before they are decoded.
 
 use macropulse_codec::decode::{self, Returns};
-use macropulse_codec::files::{
-    BeatHeader, Digest, HistogramHeader, Limits, SampleHeader, TapHeader,
-};
-use macropulse_codec::{Record, RecordKind, ShotLog};
+use macropulse_codec::files::{Digest, Limits, SampleHeader};
+use macropulse_codec::{Beats, Given, Histograms, Peak, Record, RecordKind, ShotLog, Taps};
 
-use super::Design;
 use super::detector::Detector;
+use super::{Design, Emission, Readout};
 
 /// Shots of a scan whose places and times go into the digest.
 const SAMPLES: u64 = 256;
@@ -31,14 +29,11 @@ impl Design {
     }
 
     /// The part of the `log` of a band that its receiver is given with the record: the shots all of whose light is in
-    /// it. Histograms, taps and beats are those of their own shot, so
-    /// that no others are.
+    /// it. A record that is made shot by shot is that of the owned shots alone.
     pub fn known(&self, log: &ShotLog) -> ShotLog {
-        match self.records() {
-            RecordKind::Ticks | RecordKind::Samples => self.cut().known(log),
-            RecordKind::Histograms | RecordKind::Taps | RecordKind::Beats => {
-                log.part(log.owned.clone())
-            }
+        match self.records().is_by_shot() {
+            true => log.part(log.owned.clone()),
+            false => self.cut().known(log),
         }
     }
 
@@ -67,34 +62,30 @@ impl Design {
         })
     }
 
-    /// Returns the header of its histograms, with their number left open; `None` of a sensor that records
-    /// none.
-    pub fn histogram_header(&self) -> Option<HistogramHeader> {
-        let bins = self.readout.histogram()?.bins;
-        Some(HistogramHeader {
-            bin_fs: self.clock.tick_fs,
-            offset_fs: 0,
-            bins,
-            digest: Some(self.recorded_digest()),
-            count: None,
-        })
-    }
-
-    /// Returns the header of its taps, with their number left open; `None` of a sensor that records none.
-    pub fn tap_header(&self) -> Option<TapHeader> {
-        let taps = self.emission.modulation()?.taps();
-        Some(TapHeader { taps, digest: Some(self.recorded_digest()), count: None })
-    }
-
-    /// Returns the header of its beats, with their number left open; `None` of a sensor that records none.
-    pub fn beat_header(&self) -> Option<BeatHeader> {
-        let Detector::Coherent(coherent) = &self.detector else { return None };
-        Some(BeatHeader {
-            ramps: coherent.chirp.ramps().len() as u32,
-            peaks: coherent.spectrum.peaks,
-            digest: Some(self.recorded_digest()),
-            count: None,
-        })
+    /// The record of one shot in which nothing was detected; `None` of a sensor whose record is not made shot by shot.
+    pub fn blank_record(&self) -> Option<Given> {
+        let blank = match (&self.readout, &self.emission) {
+            (Readout::Histogram(histogram), Emission::Burst(burst)) => {
+                Given::Histograms(Histograms {
+                    bin_fs: self.clock.tick_fs,
+                    offset_fs: 0,
+                    bins: histogram.bins,
+                    cycles: vec![burst.pulses],
+                    counts: vec![0; histogram.bins as usize],
+                })
+            }
+            (Readout::Taps, Emission::Modulated(modulation)) => {
+                let taps = modulation.taps();
+                Given::Taps(Taps { taps, codes: vec![0; taps as usize] })
+            }
+            (Readout::Spectrum(spectrum), Emission::Chirped(chirp)) => {
+                let (ramps, peaks) = (chirp.ramps().len() as u32, spectrum.peaks);
+                let found = vec![Peak::EMPTY; (ramps * peaks) as usize];
+                Given::Beats(Beats { ramps, peaks, found })
+            }
+            _ => return None,
+        };
+        Some(blank)
     }
 
     /// Returns the hash of all that is sent and how it is timed. It covers the codebook chip by chip, the

@@ -46,31 +46,25 @@ pub(super) fn recorded(
 ) -> Recorded {
     let (design, detectors) = (setup.seen.design, setup.detectors);
     let mut tally = Tally::default();
-    if let Some(histograms) = detectors.histograms(log, light) {
-        tally.counts = histograms.counts.iter().map(|count| u64::from(*count)).sum();
-        tally.detections = tally.counts;
-        return Recorded { given: stages.done(DETECT, Given::Histograms(histograms)), tally };
-    }
-    if let Some(taps) = detectors.taps(log, light) {
-        tally.taps = taps.codes.len() as u64;
-        return Recorded { given: stages.done(DETECT, Given::Taps(taps)), tally };
-    }
-    if let Some(beats) = detectors.beats(log, light) {
-        tally.peaks = beats.found.iter().filter(|peak| peak.power > 0).count() as u64;
-        return Recorded { given: stages.done(DETECT, Given::Beats(beats)), tally };
-    }
+    let histograms = || detectors.histograms(log, light).map(Given::Histograms);
+    let taps = || detectors.taps(log, light).map(Given::Taps);
+    let beats = || detectors.beats(log, light).map(Given::Beats);
     let span = band.ticks(design).0;
-    if let Some(samples) = detectors.samples(log, light, &span) {
-        tally.samples = samples.code.len() as u64;
-        return Recorded { given: stages.done(DETECT, Given::Samples(samples)), tally };
+    let samples = || detectors.samples(log, light, &span).map(Given::Samples);
+    if let Some(given) = histograms().or_else(taps).or_else(beats).or_else(samples) {
+        tally.recorded = given.counted();
+        if matches!(given, Given::Histograms(_)) {
+            tally.detections = tally.recorded;
+        }
+        return Recorded { given: stages.done(DETECT, given), tally };
     }
     let response = stages.done(DETECT, detectors.response(log, light, memory));
     let wanted = Wanted { known_busy: known, from: span.start };
     let mut converted = tdc::ticks(design, response, wanted);
-    tally.ticks = converted.made;
+    tally.recorded = converted.made;
     cut(setup, memory, (band, log), &mut converted);
     let Converted { ticks, peak_busy, lost, merged, .. } = converted;
-    tally.detections = tally.ticks + merged + lost;
+    tally.detections = tally.recorded + merged + lost;
     (tally.merged, tally.lost, tally.peak_busy) = (merged, lost, peak_busy);
     Recorded { given: stages.done(READOUT, Given::Ticks(ticks)), tally }
 }

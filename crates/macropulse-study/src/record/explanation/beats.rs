@@ -2,13 +2,13 @@
 
 use macropulse::codec::decode::beat::{BeatReceiver, Candidate, Refused, candidates};
 use macropulse::codec::decode::{self, Method, Verdict};
-use macropulse::codec::{Beats, Peak, ShotLog};
+use macropulse::codec::{Beats, Peak, RecordKind};
 use macropulse::design::Design;
 use macropulse::units::range_from_tof;
 use serde::{Deserialize, Serialize};
 
 use super::curve::Scale;
-use super::{Decision, Record, Shot, alone};
+use super::{OfShot, RecordExplanation, Sent, Shot};
 use crate::text::{Columns, short};
 use crate::view::{Axis, Chart, Hue, Series, Style};
 
@@ -20,7 +20,7 @@ pub(super) struct Spectra {
     threshold: f64,
     /// The measurements that peaks of all ramps make together, the strongest first.
     candidates: Vec<Pair>,
-    pub scale: Scale,
+    scale: Scale,
 }
 
 /// The peaks of a ramp.
@@ -52,34 +52,13 @@ struct Pair {
     decided: String,
 }
 
-/// Explains shot number `at` of a band out of its `beats`.
-pub(super) fn decision<'a>(
-    design: &Design,
-    (log, beats): (&'a ShotLog, &Beats),
-    at: usize,
-) -> Result<Decision<'a>, decode::Error> {
-    let own = Beats { found: beats.of(at).to_vec(), ..*beats };
-    let verdict = alone(design, log, at, &own)?;
-    let tick_fs = design.clock.tick_fs;
-    let fired_tick = log.fired_at_fs[at].div_euclid(tick_fs);
-    let shot = Shot { log, at, fired_tick, tick_fs, within_tick_fs: 0 };
-    let (nearest, farthest) = design.receiver.gate_ticks;
-    let record = Spectra::of(design, &own.found, Scale::new(0, 1, &shot));
-    Ok(Decision {
-        why: record.why(&verdict),
-        shot,
-        marks: vec![0],
-        gate: i64::from(nearest)..i64::from(farthest) + 1,
-        width: 1,
-        verdict,
-        record: Record::Beats(record),
-    })
-}
+impl OfShot for Spectra {
+    type Record = Beats;
 
-impl Spectra {
-    fn of(design: &Design, peaks: &[Peak], scale: Scale) -> Self {
+    fn of(design: &Design, beats: &Beats, at: usize, shot: &Shot) -> Result<Self, decode::Error> {
+        let (peaks, scale) = (beats.of(at), Scale::new(0, 1, shot));
         let none = Self { ramps: Vec::new(), threshold: 0.0, candidates: Vec::new(), scale };
-        let Method::Beat(method) = &design.receiver.method else { return none };
+        let Method::Beat(method) = &design.receiver.method else { return Ok(none) };
         let receiver = BeatReceiver::of(&design.receiver, method);
         let threshold = method.threshold(receiver.gate_fs);
         let each = peaks.len() / method.ramps.len().max(1);
@@ -109,7 +88,7 @@ impl Spectra {
             .to_owned(),
         };
         let candidates = candidates(&receiver, threshold, peaks).into_iter().map(pair).collect();
-        Self { ramps: ramps.collect(), threshold, candidates, ..none }
+        Ok(Self { ramps: ramps.collect(), threshold, candidates, ..none })
     }
 
     fn why(&self, verdict: &Verdict) -> String {
@@ -127,9 +106,19 @@ impl Spectra {
             (_, None) => "A ramp has no peak that noise would not have.".to_owned(),
         }
     }
+}
+
+impl RecordExplanation for Spectra {
+    fn kind(&self) -> RecordKind {
+        RecordKind::Beats
+    }
+
+    fn scale(&self) -> Option<&Scale> {
+        Some(&self.scale)
+    }
 
     /// Adds a line for each ramp, and one for each candidate of the first few.
-    pub fn push(&self, columns: &mut Columns) {
+    fn push(&self, _: usize, columns: &mut Columns) {
         for ramp in &self.ramps {
             let told = |beat: &Beat| {
                 format!(
@@ -160,7 +149,7 @@ impl Spectra {
     }
 
     /// The powers of the peaks over the ranges of surfaces that would stand still.
-    pub fn charts(&self) -> Option<Vec<(Chart, &'static str)>> {
+    fn charts(&self, _: &Sent) -> Option<Vec<(Chart, &'static str)>> {
         let peaks = self.ramps.iter().flat_map(|ramp| &ramp.peaks);
         let pairs = self.candidates.iter().map(|pair| pair.power);
         let most = pairs.chain(peaks.clone().map(|peak| peak.power)).fold(self.threshold, f64::max);

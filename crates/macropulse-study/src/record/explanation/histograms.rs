@@ -1,13 +1,13 @@
 //! The explanation of a shot whose counts are a histogram.
 
 use macropulse::codec::decode::{self, Verdict};
-use macropulse::codec::{Histograms, ShotLog};
+use macropulse::codec::{Histograms, RecordKind};
 use macropulse::design::Design;
 use macropulse::units::range_from_tof;
 use serde::{Deserialize, Serialize};
 
 use super::curve::Scale;
-use super::{Decision, Record, Return, Shot};
+use super::{OfShot, RecordExplanation, Sent, Shot};
 use crate::text::{Columns, counted, grouped, short};
 use crate::view::{Axis, Chart, Hue, Note, Series, Style};
 
@@ -20,43 +20,9 @@ pub(super) struct Counts {
     total: u64,
     /// Median of the counts of a bin: about the background.
     median_of_bins: u32,
-    pub scale: Scale,
+    scale: Scale,
     /// Counts of each bin; nothing in a summary.
-    pub counts: Option<Vec<u32>>,
-}
-
-/// Explains shot number `at` of a band out of its `histograms`.
-pub(super) fn decision<'a>(
-    design: &Design,
-    (log, histograms): (&'a ShotLog, &Histograms),
-    at: usize,
-) -> Result<Decision<'a>, decode::Error> {
-    let counts = histograms.of(at).to_vec();
-    let cycles = histograms.cycles.get(at).copied().unwrap_or(0);
-    let alone = Histograms { cycles: vec![cycles], counts: counts.clone(), ..*histograms };
-    let verdict = super::alone(design, log, at, &alone)?;
-    let tick_fs = design.clock.tick_fs;
-    let fired_tick = log.fired_at_fs[at].div_euclid(tick_fs);
-    let shot = Shot { log, at, fired_tick, tick_fs, within_tick_fs: 0 };
-    // A bin stands for its middle.
-    let middle = Shot { log, at, fired_tick, tick_fs, within_tick_fs: tick_fs / 2 };
-    let (nearest, farthest) = design.receiver.gate_ticks;
-    let record = Counts {
-        cycles,
-        total: counts.iter().map(|count| u64::from(*count)).sum(),
-        median_of_bins: median(&counts),
-        scale: Scale::new(0, 1, &middle),
-        counts: Some(counts),
-    };
-    Ok(Decision {
-        why: record.why(&verdict),
-        shot,
-        marks: vec![0],
-        gate: i64::from(nearest)..i64::from(farthest) + 1,
-        width: 1,
-        verdict,
-        record: Record::Histograms(record),
-    })
+    counts: Option<Vec<u32>>,
 }
 
 fn median(counts: &[u32]) -> u32 {
@@ -65,7 +31,27 @@ fn median(counts: &[u32]) -> u32 {
     sorted.get(sorted.len() / 2).copied().unwrap_or(0)
 }
 
-impl Counts {
+impl OfShot for Counts {
+    type Record = Histograms;
+
+    fn of(
+        design: &Design,
+        histograms: &Histograms,
+        at: usize,
+        shot: &Shot,
+    ) -> Result<Self, decode::Error> {
+        let counts = histograms.of(at).to_vec();
+        // A bin stands for its middle.
+        let middle = Shot { within_tick_fs: design.clock.tick_fs / 2, ..*shot };
+        Ok(Self {
+            cycles: histograms.cycles.get(at).copied().unwrap_or(0),
+            total: counts.iter().map(|count| u64::from(*count)).sum(),
+            median_of_bins: median(&counts),
+            scale: Scale::new(0, 1, &middle),
+            counts: Some(counts),
+        })
+    }
+
     fn why(&self, verdict: &Verdict) -> String {
         let Self { cycles, median_of_bins, .. } = self;
         let cycles = counted(u64::from(*cycles), "pulse");
@@ -86,9 +72,23 @@ impl Counts {
         });
         each.collect::<Vec<_>>().join(" ")
     }
+}
+
+impl RecordExplanation for Counts {
+    fn kind(&self) -> RecordKind {
+        RecordKind::Histograms
+    }
+
+    fn scale(&self) -> Option<&Scale> {
+        Some(&self.scale)
+    }
+
+    fn shorten(&mut self) {
+        self.counts = None;
+    }
 
     /// Adds the lines about the histogram.
-    pub fn push(&self, columns: &mut Columns) {
+    fn push(&self, _: usize, columns: &mut Columns) {
         let total = grouped(self.total);
         let pulses = counted(u64::from(self.cycles), "pulse");
         columns
@@ -96,7 +96,7 @@ impl Counts {
     }
 
     /// The histogram, with what is said of it.
-    pub fn charts(&self, returns: &[Return]) -> Option<Vec<(Chart, &'static str)>> {
+    fn charts(&self, sent: &Sent) -> Option<Vec<(Chart, &'static str)>> {
         let counts = self.counts.as_ref()?;
         let points: Vec<[f64; 2]> = (0..)
             .zip(counts)
@@ -114,7 +114,7 @@ impl Counts {
             style: Style::Line,
             hue: Hue::Blue,
         });
-        for one in returns {
+        for one in sent.returns {
             let at = [one.range_m, f64::from(self.at(one.range_m, counts))];
             chart.notes.push(Note { at, text: format!("{:.3} m", one.range_m) });
         }
@@ -123,7 +123,9 @@ impl Counts {
             "The counts that all pulses of the burst added up to; marked are the returns.",
         )])
     }
+}
 
+impl Counts {
     /// The counts of the bin at `range` metres.
     fn at(&self, range: f64, counts: &[u32]) -> u32 {
         let bins = counts.iter().enumerate();

@@ -15,7 +15,8 @@ use std::ops::Range;
 use std::path::Path;
 
 use macropulse::codec::decode::{self, Accepted, Reject, Verdict};
-use macropulse::codec::{self, Given, ShotLog};
+use macropulse::codec::files::ShotRecord;
+use macropulse::codec::{self, Given, RecordKind, ShotLog};
 use macropulse::design::Design;
 use macropulse::formats::{versioned, write_atomically};
 use macropulse::sim::{Arrivals, Stretch};
@@ -89,41 +90,96 @@ enum Record {
     Beats(Spectra),
 }
 
-impl Record {
-    /// Adds the lines of this kind to the text about a macropulse of `marks` marks.
-    fn push(&self, marks: usize, columns: &mut Columns) {
-        match self {
-            Self::Ticks(ticks) => ticks.push(marks, columns),
-            Self::Samples(samples) => samples.push(columns),
-            Self::Histograms(counts) => counts.push(columns),
-            Self::Taps(phasors) => phasors.push(columns),
-            Self::Beats(spectra) => spectra.push(columns),
-        }
-    }
+/// The explanation of a record, of whatever kind.
+trait RecordExplanation {
+    /// The kind of the record.
+    fn kind(&self) -> RecordKind;
 
     /// The lags of its correlation.
-    fn scale(&self) -> Option<&Scale> {
+    fn scale(&self) -> Option<&Scale>;
+
+    /// Drops every list that has an entry for each tick or lag.
+    fn shorten(&mut self) {}
+
+    /// Adds its lines to the text about a macropulse of `marks` marks.
+    fn push(&self, marks: usize, columns: &mut Columns);
+
+    /// The charts, each with its caption; `None` of a summary.
+    fn charts(&self, sent: &Sent) -> Option<Vec<(Chart, &'static str)>>;
+}
+
+/// What charts show beside the record.
+struct Sent<'a> {
+    /// When the marks of the macropulse leave, in ticks.
+    marks: &'a [u32],
+    light: Option<&'a Light>,
+    returns: &'a [Return],
+}
+
+/// The explanation of a record that is made shot by shot.
+trait OfShot: Sized {
+    type Record: ShotRecord;
+
+    /// Explains the record of shot number `at`, which is `shot`.
+    fn of(
+        design: &Design,
+        record: &Self::Record,
+        at: usize,
+        shot: &Shot,
+    ) -> Result<Self, decode::Error>;
+
+    /// The reasons of the verdict, in sentences.
+    fn why(&self, verdict: &Verdict) -> String;
+}
+
+/// Explains shot number `at` of a band out of its `record`.
+fn of_shot<'a, E: OfShot>(
+    design: &Design,
+    (log, record): (&'a ShotLog, &E::Record),
+    at: usize,
+    kept: fn(E) -> Record,
+) -> Result<Decision<'a>, decode::Error> {
+    let verdict = alone(design, log, at, &record.one(at))?;
+    let tick_fs = design.clock.tick_fs;
+    let fired_tick = log.fired_at_fs[at].div_euclid(tick_fs);
+    let shot = Shot { log, at, fired_tick, tick_fs, within_tick_fs: 0 };
+    let (nearest, farthest) = design.receiver.gate_ticks;
+    let explained = E::of(design, record, at, &shot)?;
+    Ok(Decision {
+        why: explained.why(&verdict),
+        shot,
+        marks: vec![0],
+        gate: i64::from(nearest)..i64::from(farthest) + 1,
+        width: 1,
+        verdict,
+        record: kept(explained),
+    })
+}
+
+impl Record {
+    fn explanation(&self) -> &dyn RecordExplanation {
         match self {
-            Self::Ticks(ticks) => ticks.whole.as_ref().map(|whole| &whole.correlation.scale),
-            Self::Samples(samples) => samples.whole.as_ref().map(|whole| &whole.correlation.scale),
-            Self::Histograms(counts) => Some(&counts.scale),
-            Self::Taps(phasors) => Some(&phasors.scale),
-            Self::Beats(spectra) => Some(&spectra.scale),
+            Self::Ticks(ticks) => ticks,
+            Self::Samples(samples) => samples,
+            Self::Histograms(counts) => counts,
+            Self::Taps(phasors) => phasors,
+            Self::Beats(spectra) => spectra,
         }
     }
 
-    /// Drops every list that has an entry for each tick or lag.
-    fn shorten(&mut self) {
+    fn explanation_mut(&mut self) -> &mut dyn RecordExplanation {
         match self {
-            Self::Ticks(ticks) => ticks.whole = None,
-            Self::Samples(samples) => samples.whole = None,
-            Self::Histograms(counts) => counts.counts = None,
-            Self::Taps(_) | Self::Beats(_) => {}
+            Self::Ticks(ticks) => ticks,
+            Self::Samples(samples) => samples,
+            Self::Histograms(counts) => counts,
+            Self::Taps(phasors) => phasors,
+            Self::Beats(spectra) => spectra,
         }
     }
 }
 
 /// The shot that is explained, in the log of its band.
+#[derive(Clone, Copy)]
 struct Shot<'a> {
     log: &'a ShotLog,
     at: usize,
@@ -200,9 +256,9 @@ impl PixelExplanation {
         let Decision { shot, marks, gate, width, verdict, why, record } = match given {
             Given::Ticks(ticks) => ticks::decision(design, (log, ticks), shot)?,
             Given::Samples(samples) => samples::decision(design, (log, samples), shot)?,
-            Given::Histograms(counts) => histograms::decision(design, (log, counts), shot)?,
-            Given::Taps(taps) => taps::decision(design, (log, taps), shot)?,
-            Given::Beats(beats) => beats::decision(design, (log, beats), shot)?,
+            Given::Histograms(record) => of_shot(design, (log, record), shot, Record::Histograms)?,
+            Given::Taps(record) => of_shot(design, (log, record), shot, Record::Taps)?,
+            Given::Beats(record) => of_shot(design, (log, record), shot, Record::Beats)?,
         };
         let lasts = marks.last().map_or(0, |last| last + width);
         let light = arrivals(&Stretch {
@@ -256,34 +312,31 @@ impl PixelExplanation {
                 grouped(self.fired_at_fs.unsigned_abs())
             ),
         );
-        if let Some(scale) = self.record.scale() {
+        let explained = self.record.explanation();
+        if let Some(scale) = explained.scale() {
             let [first, last] = self.gate_ticks;
             let [nearest, farthest] = [first, last].map(|lag| short(scale.range(lag)));
             let lags = grouped((last - first + 1) as u64);
             columns.push("gate", format!("{nearest} to {farthest} m, {lags} lags"));
         }
-        let (recorded, has_events) = match self.record {
-            Record::Ticks(_) => ("ticks", true),
-            Record::Samples(_) => ("samples", false),
-            Record::Histograms(_) => ("histograms", false),
-            Record::Taps(_) => ("taps", false),
-            Record::Beats(_) => ("beats", false),
-        };
         columns.push(
             "light",
             match &self.light {
-                Some(light) => light.text(has_events),
-                None => format!("not known: what is decoded is {recorded} alone"),
+                Some(light) => light.text(explained.kind() == RecordKind::Ticks),
+                None => {
+                    let recorded = explained.kind().name();
+                    format!("not known: what is decoded is {recorded} alone")
+                }
             },
         );
-        self.record.push(self.marks_ticks.len(), &mut columns);
+        explained.push(self.marks_ticks.len(), &mut columns);
         let Self { row, column, shot, .. } = self;
         format!("row {row}, column {column}, shot {shot}\n\n{}", columns.text())
     }
 
     /// The JSON object for programs, without the lists that have an entry for each tick or lag.
     pub fn summary(mut self) -> Value {
-        self.record.shorten();
+        self.record.explanation_mut().shorten();
         self.light.iter_mut().for_each(|light| light.times = None);
         self.value()
     }
@@ -298,13 +351,8 @@ impl PixelExplanation {
 
     /// The charts, each with what is said of it; `None` of a summary.
     fn charts(&self) -> Option<Vec<(Chart, &'static str)>> {
-        match &self.record {
-            Record::Ticks(ticks) => ticks.charts(&self.marks_ticks, self.light.as_ref()),
-            Record::Samples(samples) => samples.charts(),
-            Record::Histograms(counts) => counts.charts(&self.returns),
-            Record::Taps(phasors) => phasors.charts(&self.returns),
-            Record::Beats(spectra) => spectra.charts(),
-        }
+        let (marks, light, returns) = (&self.marks_ticks, self.light.as_ref(), &self.returns);
+        self.record.explanation().charts(&Sent { marks, light, returns })
     }
 
     /// Its section of a page: the decision, what was sent, what came to the detector and what it

@@ -1,13 +1,13 @@
 //! The explanation of a shot that was decided by samples.
 
 use macropulse::codec::decode::{self, MarkState, Refusal, Reject, SampledExplanation, Sampling};
-use macropulse::codec::{self, ShotLog};
+use macropulse::codec::{self, RecordKind, ShotLog};
 use macropulse::design::Design;
 use macropulse::units::range_from_tof;
 use serde::{Deserialize, Serialize};
 
 use super::curve::{Curve, Scale, Words};
-use super::{Decision, MOST_OTHERS, Record, Shot, finite};
+use super::{Decision, MOST_OTHERS, Record, RecordExplanation, Sent, Shot, finite};
 use crate::text::{Columns, counted, short};
 use crate::view::{Axis, Chart, Hue, Series, Style};
 
@@ -33,7 +33,7 @@ pub(super) struct Samples {
     cancelled: Vec<CancelledEcho>,
     /// The signal and every lag; nothing in a summary.
     #[serde(flatten)]
-    pub whole: Option<Whole>,
+    whole: Option<Whole>,
 }
 
 /// A lag at which light of the shot was tested for.
@@ -269,9 +269,21 @@ impl Reasons<'_> {
     }
 }
 
-impl Samples {
+impl RecordExplanation for Samples {
+    fn kind(&self) -> RecordKind {
+        RecordKind::Samples
+    }
+
+    fn scale(&self) -> Option<&Scale> {
+        self.whole.as_ref().map(|whole| &whole.correlation.scale)
+    }
+
+    fn shorten(&mut self) {
+        self.whole = None;
+    }
+
     /// Adds the lines about the signal and what was tested.
-    pub fn push(&self, columns: &mut Columns) {
+    fn push(&self, _: usize, columns: &mut Columns) {
         columns.push(
             "noise",
             format!("{} photons behind the matched filter", photons(Some(self.noise_photons))),
@@ -299,7 +311,7 @@ impl Samples {
     }
 
     /// The signal and the sum of the marks, each chart with what is said of it.
-    pub fn charts(&self) -> Option<Vec<(Chart, &'static str)>> {
+    fn charts(&self, _: &Sent) -> Option<Vec<(Chart, &'static str)>> {
         let Whole { signal, correlation } = self.whole.as_ref()?;
         let said = "What the filter that is matched to the pulse makes of the samples, at the marks of the \
                     lag that was tested first; and what was left of it then, echoes of other shots \

@@ -2,13 +2,13 @@
 
 use macropulse::codec::decode::phase::measured;
 use macropulse::codec::decode::{self, Method, Verdict};
-use macropulse::codec::{ShotLog, Taps};
+use macropulse::codec::{RecordKind, Taps};
 use macropulse::design::Design;
 use macropulse::units::range_from_tof;
 use serde::{Deserialize, Serialize};
 
 use super::curve::Scale;
-use super::{Decision, Record, Return, Shot, alone};
+use super::{OfShot, RecordExplanation, Sent, Shot};
 use crate::text::{Columns, short};
 use crate::view::{Axis, Chart, Hue, Series, Style};
 
@@ -16,7 +16,7 @@ use crate::view::{Axis, Chart, Hue, Series, Style};
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Phasors {
     tones: Vec<Tone>,
-    pub scale: Scale,
+    scale: Scale,
 }
 
 /// A modulation frequency, and what its taps tell.
@@ -38,31 +38,6 @@ struct Phasor {
     /// Range that the phase stands for in the first interval, and the length of an interval.
     range_m: f64,
     interval_m: f64,
-}
-
-/// Explains shot number `at` of a band out of its `taps`.
-pub(super) fn decision<'a>(
-    design: &Design,
-    (log, taps): (&'a ShotLog, &Taps),
-    at: usize,
-) -> Result<Decision<'a>, decode::Error> {
-    let codes = taps.of(at).to_vec();
-    let own = Taps { taps: taps.taps, codes: codes.clone() };
-    let verdict = alone(design, log, at, &own)?;
-    let tick_fs = design.clock.tick_fs;
-    let fired_tick = log.fired_at_fs[at].div_euclid(tick_fs);
-    let shot = Shot { log, at, fired_tick, tick_fs, within_tick_fs: 0 };
-    let (nearest, farthest) = design.receiver.gate_ticks;
-    let record = Phasors { tones: tones(design, &codes)?, scale: Scale::new(0, 1, &shot) };
-    Ok(Decision {
-        why: record.why(&verdict),
-        shot,
-        marks: vec![0],
-        gate: i64::from(nearest)..i64::from(farthest) + 1,
-        width: 1,
-        verdict,
-        record: Record::Taps(record),
-    })
 }
 
 /// The phasors that the `codes` of a shot give, frequency by frequency.
@@ -89,7 +64,13 @@ fn tones(design: &Design, codes: &[u16]) -> Result<Vec<Tone>, decode::Error> {
     Ok(tones)
 }
 
-impl Phasors {
+impl OfShot for Phasors {
+    type Record = Taps;
+
+    fn of(design: &Design, taps: &Taps, at: usize, shot: &Shot) -> Result<Self, decode::Error> {
+        Ok(Self { tones: tones(design, taps.of(at))?, scale: Scale::new(0, 1, shot) })
+    }
+
     fn why(&self, verdict: &Verdict) -> String {
         let Some(found) = verdict.returns.first() else {
             return match self.tones.iter().all(|tone| tone.phasor.is_none()) {
@@ -108,9 +89,19 @@ impl Phasors {
             found.margin
         )
     }
+}
+
+impl RecordExplanation for Phasors {
+    fn kind(&self) -> RecordKind {
+        RecordKind::Taps
+    }
+
+    fn scale(&self) -> Option<&Scale> {
+        Some(&self.scale)
+    }
 
     /// Adds a line for each modulation frequency.
-    pub fn push(&self, columns: &mut Columns) {
+    fn push(&self, _: usize, columns: &mut Columns) {
         for tone in &self.tones {
             let codes: Vec<String> = tone.codes.iter().map(u16::to_string).collect();
             let phasor = match &tone.phasor {
@@ -130,7 +121,7 @@ impl Phasors {
     }
 
     /// The codes over the phases of their taps.
-    pub fn charts(&self, _: &[Return]) -> Option<Vec<(Chart, &'static str)>> {
+    fn charts(&self, _: &Sent) -> Option<Vec<(Chart, &'static str)>> {
         let codes = self.tones.iter().flat_map(|tone| &tone.codes);
         let most = codes.copied().max().unwrap_or(1).max(1);
         let x = Axis::linear("Phase of the tap, degrees").limits(0.0, 360.0);

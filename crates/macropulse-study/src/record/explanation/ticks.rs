@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use macropulse::codec::decode::{self, Explanation, Reject};
-use macropulse::codec::{self, ShotLog};
+use macropulse::codec::{self, RecordKind, ShotLog};
 use macropulse::design::Design;
 use macropulse::units::range_from_tof;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::curve::{Curve, Scale, Words};
 use super::light::Light;
 use super::odds::Odds;
-use super::{Decision, MOST_OTHERS, Record, Shot};
+use super::{Decision, MOST_OTHERS, Record, RecordExplanation, Sent, Shot};
 use crate::text::{Columns, counted, grouped, short};
 use crate::view::{Axis, Chart, Hue, Series, Style};
 
@@ -39,7 +39,7 @@ pub(super) struct Ticks {
     others: Vec<OtherShot>,
     /// Every tick and every lag; nothing in a summary.
     #[serde(flatten)]
-    pub whole: Option<Whole>,
+    whole: Option<Whole>,
 }
 
 /// A lag and its marks.
@@ -219,9 +219,21 @@ impl Reasons<'_> {
     }
 }
 
-impl Ticks {
+impl RecordExplanation for Ticks {
+    fn kind(&self) -> RecordKind {
+        RecordKind::Ticks
+    }
+
+    fn scale(&self) -> Option<&Scale> {
+        self.whole.as_ref().map(|whole| &whole.correlation.scale)
+    }
+
+    fn shorten(&mut self) {
+        self.whole = None;
+    }
+
     /// Adds the lines about the ticks and their correlation; the macropulse has `marks` marks.
-    pub fn push(&self, marks: usize, columns: &mut Columns) {
+    fn push(&self, marks: usize, columns: &mut Columns) {
         columns.push(
             "ticks",
             format!(
@@ -254,11 +266,8 @@ impl Ticks {
     }
 
     /// The ticks of a macropulse with its marks `sent`, and the correlation; each chart with its caption.
-    pub fn charts(
-        &self,
-        sent: &[u32],
-        light: Option<&Light>,
-    ) -> Option<Vec<(Chart, &'static str)>> {
+    fn charts(&self, sent: &Sent) -> Option<Vec<(Chart, &'static str)>> {
+        let (sent, light) = (sent.marks, sent.light);
         let whole = self.whole.as_ref()?;
         let said = match light {
             None => {
@@ -289,7 +298,9 @@ impl Ticks {
         let curves = curve.charts().into_iter().chain(weighed).map(|chart| (chart, ""));
         Some(arrivals.into_iter().chain(curves).collect())
     }
+}
 
+impl Ticks {
     /// The arrivals in the time of one macropulse: at the highest correlation, or else at the light of the shot.
     fn arrivals(&self, whole: &Whole, sent: &[u32], light: Option<&Light>) -> Option<Chart> {
         let lanes_of_light = light.map(Light::lanes);
