@@ -107,7 +107,7 @@ def test_histograms_decode_to_the_points_of_the_simulation(tmp_path):
         return str(raised.value)
 
     assert "1 dimensions" in told(counts=counts.ravel())
-    assert "bin_fs is 1000, and 1000000 of" in told(bin_fs=1000)
+    assert "bin_fs is 1000, and 250000 of flash" in told(bin_fs=1000)
     assert "cycles" in told(cycles=[1, 2])
     assert "did you mean `counts`" in told(count=counts)
 
@@ -169,7 +169,8 @@ def test_beats_decode_to_the_points_of_the_simulation():
 
     assert "1 dimensions" in told(frequency=frequency.ravel())
     assert "`frequency` has 15 columns" in told(frequency=frequency[:, 1:])
-    assert "`power` has the shape [240, 15]" in told(power=power[:, 1:])
+    assert "`power` has 15 columns, and fmcw-1550 has 16 peaks" in told(power=power[:, 1:])
+    assert "`power` has 239 rows, and the column before it 240" in told(power=power[1:])
     assert "did you mean `power`" in told(powers=power)
 
 
