@@ -5,7 +5,7 @@
 //! measured. `docs/hardening.md` has the estimates beside the memory that runs have taken.
 
 use crate::channel::{Error, Operating};
-use crate::design::{Design, Effect, Modulation, Readout};
+use crate::design::{Design, Effect, Readout};
 use crate::emit::bands;
 use crate::environment::Environment;
 use crate::scene::{PER_TRIANGLE, Scene};
@@ -46,15 +46,6 @@ const PER_SAMPLE: f64 = 4.0;
 /// Bytes of a sample of the one channel that is simulated or decoded: its signal and noise, the filtered
 /// signal, what hides it, and its weight.
 const PER_SAMPLE_AT_WORK: f64 = 40.0;
-
-/// Bytes of a bin of a histogram: its count, and the same once more while it is written.
-const PER_BIN: f64 = 8.0;
-
-/// Bytes of a tap: its code, and the same once more while it is written.
-const PER_TAP: f64 = 4.0;
-
-/// Bytes of a peak: its frequency and its power, and the same once more while it is written.
-const PER_PEAK: f64 = 16.0;
 
 /// The memory of a run, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -140,18 +131,15 @@ fn band(design: &Design, operating: &Operating) -> u64 {
     let channels = f64::from(design.channels());
     let noise = (operating.false_rate * lasts).min(lasts / tick) * channels;
     let events = marks * PER_MARK_SEEN + noise * PER_NOISE;
-    let recorded = match &design.readout {
-        Readout::Tdc(_) => events,
-        Readout::Adc => events + lasts / tick * (channels * PER_SAMPLE + PER_SAMPLE_AT_WORK),
-        Readout::Histogram(histogram) => band.shots as f64 * f64::from(histogram.bins) * PER_BIN,
-        Readout::Taps => {
-            let taps = design.emission.modulation().map_or(0, Modulation::taps);
-            band.shots as f64 * f64::from(taps) * PER_TAP
+    let recorded = match design.readout.model().bytes_of_part() {
+        Some(bytes) => {
+            let parts = f64::from(design.emission.model().recorded_parts());
+            band.shots as f64 * parts * bytes
         }
-        Readout::Spectrum(spectrum) => {
-            let ramps = design.emission.chirp().map_or(0, |chirp| chirp.ramps().len());
-            band.shots as f64 * ramps as f64 * f64::from(spectrum.peaks) * PER_PEAK
+        None if matches!(design.readout, Readout::Adc) => {
+            events + lasts / tick * (channels * PER_SAMPLE + PER_SAMPLE_AT_WORK)
         }
+        None => events,
     };
     (shots * per_shot + recorded) as u64
 }

@@ -453,7 +453,7 @@ impl Tally {
                 "every surface met is black at this wavelength, or no longer in the field of the \
                  receiver when its light comes",
             ),
-            _ if self.recorded > 0 => Some(design.readout.why_nothing_is_found()),
+            _ if self.recorded > 0 => Some(design.readout.model().why_nothing_is_found()),
             _ if self.detections == 0 => {
                 Some("the detector saw none of the echoes: too little light for its sensitivity")
             }

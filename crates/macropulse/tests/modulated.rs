@@ -104,7 +104,7 @@ fn of_two(design: &Design, ranges: [f64; 2], second: f64) -> f64 {
     let light = light_of_echoes(design, &log, echoes);
     let operating = Operating::of(design, &Environment::vacuum_dark()).unwrap();
     let detectors = Detectors::new(design, &operating, Chance::new(9));
-    let taps = detectors.taps(&log, &light).unwrap();
+    let taps = detectors.record_by_shot(&log, &light).unwrap();
     let returns = design.receive(&design.known(&log), &taps).unwrap();
     let sum: f64 = returns.tof.iter().map(|tof| range_from_tof(*tof)).sum();
     sum / returns.len() as f64

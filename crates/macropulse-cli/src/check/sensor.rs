@@ -8,7 +8,6 @@ use macropulse::environment::Environment;
 use macropulse::memory::Estimate;
 use macropulse::predict::deepest_baseline;
 use macropulse::predict::unmodelled::{self, LeftOut};
-use macropulse::units::{range_from_tof, s_from_fs};
 use macropulse_study::record::{defaults, not_modelled, surroundings};
 use serde_json::{Map, Value, json};
 
@@ -185,17 +184,12 @@ fn ranges(design: &Design, derived: &Derived) -> Columns {
     let mut columns = Columns::default();
     let (near, far) = (design.scan.min_range, design.scan.max_range);
     columns.push("accepted", format!("{} to {} m", short(near), short(far)));
+    let ambiguity = design.emission.model().ambiguity();
     columns.push(
         "unambiguous",
         match derived.unambiguous_range {
-            Some(range) if design.emission.modulation().is_some() => {
-                format!("{} m, where the phases of all modulation frequencies repeat", short(range))
-            }
-            Some(range) => format!("{} m, where a code word comes again", short(range)),
-            None if design.emission.chirp().is_some() => {
-                "as far as its samples hold the beats".to_owned()
-            }
-            None => "by the detector alone: shots carry no code".to_owned(),
+            Some(range) => format!("{} m, where {ambiguity}", short(range)),
+            None => ambiguity.to_owned(),
         },
     );
     columns.push("one tick", format!("{} mm", short(derived.tick_range * 1e3)));
@@ -225,24 +219,13 @@ fn light(design: &Design, derived: &Derived) -> Columns {
             false => format!("{count} with {fewest} to {most} by word"),
         });
         columns.push("", format!("labels by marks: {}", labels.collect::<Vec<_>>().join(", ")));
-    } else if let Some(modulation) = design.emission.modulation() {
-        let mhz: Vec<String> = modulation.hz.iter().map(|hz| short(hz * 1e-6)).collect();
-        let exposure = short(s_from_fs(modulation.exposure_fs) * 1e6);
-        let length = short(derived.macropulse * 1e3);
-        columns.push("shot", format!("modulated with {} MHz, in {length} ms", mhz.join(", ")));
-        let taps = counted(u64::from(modulation.phases), "tap");
-        columns.push("", format!("{taps} of each frequency, {exposure} us long"));
-    } else if let Some(chirp) = design.emission.chirp() {
-        let (ghz, length) = (short(chirp.bandwidth * 1e-9), short(derived.macropulse * 1e6));
-        let cell = short(range_from_tof(1.0 / chirp.bandwidth));
-        columns.push("shot", format!("a frequency that changes by {ghz} GHz, in {length} us"));
-        let times: Vec<String> =
-            chirp.ramps().iter().map(|ramp| format!("{} us", short(ramp.seconds * 1e6))).collect();
-        columns.push("", format!("recorded for {}: bins of {cell} m", times.join(" up and ")));
-        columns.push("", format!("line {} kHz wide", short(chirp.linewidth * 1e-3)));
-    } else {
+    } else if design.emission.is_pulsed() {
         let pulse = short(design.light.pulse * 1e12);
         columns.push("shot", format!("one micropulse of {pulse} ps, not coded"));
+    } else {
+        let description = design.emission.model().description(short);
+        let names = std::iter::once("shot").chain(std::iter::repeat(""));
+        names.zip(description).for_each(|(name, line)| columns.push(name, line));
     }
     let sensitivity = match derived.reference_photons {
         photons if photons.is_finite() => {

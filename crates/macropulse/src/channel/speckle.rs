@@ -51,10 +51,10 @@ pub struct Speckle {
 
 impl Speckle {
     /// Returns the speckle of a sensor whose aperture and beam are known, even if it is not simulated. A
-    /// laser without a stated line width has that of its pulses. A coherent receiver sees one cell, which it
-    /// follows itself.
+    /// laser without a stated line width has that of its pulses. `None` of a detector that follows speckle
+    /// itself.
     pub fn of(design: &Design) -> Option<Self> {
-        let is_seen = design.light.divergence > 0.0 && design.emission.chirp().is_none();
+        let is_seen = design.light.divergence > 0.0 && !design.detector.model().follows_speckle();
         let budget = design.budget.as_ref().filter(|_| is_seen)?;
         // Light without pulses has a narrow line.
         let pulse = match design.light.pulse {

@@ -51,7 +51,8 @@ impl Design {
             jitter_fs,
             listening_fs: self.listening_fs(),
             lead_fs,
-            history_fs: lead_fs + under_way_fs.max(model.memory_fs()).max(self.readout.memory_fs()),
+            history_fs: lead_fs
+                + under_way_fs.max(model.memory_fs()).max(self.readout.model().memory_fs()),
         }
     }
 

@@ -6,9 +6,11 @@ use macropulse_codec::decode::beat::{Ramp, SpectralWindow};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::limits::Check;
-use super::{Coding, Error};
-use crate::units::{fs_from_s, s_from_fs, tof_from_range};
+use super::check::{Continuous, OptionalTable, SensorFile};
+use super::emission::{Exposures, Model, Occupancy};
+use super::limits::{Check, Idle};
+use super::{Clock, Coding, Emission, Error, Readout};
+use crate::units::{fs_from_s, range_from_tof, s_from_fs, tof_from_range};
 
 /// Light whose frequency rises, and then falls. A shot is one ramp or both; before each lies the time in which
 /// the light of the ramp before it is still on its way.
@@ -45,12 +47,6 @@ impl Chirp {
         let up = Ramp { bandwidth: self.bandwidth, seconds: s_from_fs(self.up_fs) };
         let down = Ramp { bandwidth: -self.bandwidth, seconds: s_from_fs(self.down_fs) };
         if self.down_fs > 0 { vec![up, down] } else { vec![up] }
-    }
-
-    /// From the beginning of the first ramp, the unrecorded part included, to the end of the last one, fs.
-    pub fn length_fs(&self) -> i64 {
-        self.begins_fs(self.ramps().len() - 1)
-            + if self.down_fs > 0 { self.down_fs } else { self.up_fs }
     }
 
     /// When ramp number `ramp` begins to be recorded, fs after the shot.
@@ -122,6 +118,68 @@ impl Chirp {
     }
 }
 
+impl Model for Chirp {
+    fn coding(&self) -> &Coding {
+        &self.shot
+    }
+
+    /// From the beginning of the first ramp, the unrecorded part included, to the end of the last one.
+    fn length_fs(&self) -> i64 {
+        self.begins_fs(self.ramps().len() - 1)
+            + if self.down_fs > 0 { self.down_fs } else { self.up_fs }
+    }
+
+    fn exposures(&self) -> Option<Exposures> {
+        Some(Exposures { count: 1, each_fs: self.length_fs() })
+    }
+
+    fn recorded_parts(&self) -> u32 {
+        self.ramps().len() as u32
+    }
+
+    fn share_within(&self, seconds: f64) -> f64 {
+        (seconds / s_from_fs(self.length_fs())).min(1.0)
+    }
+
+    fn occupancy(&self) -> Option<Occupancy> {
+        Some(Occupancy {
+            fs: self.length_fs(),
+            table: "chirp",
+            with: "",
+            remedy: "shorter ramps, a shorter light_range_m",
+        })
+    }
+
+    fn ambiguity(&self) -> &'static str {
+        "as far as its samples hold the beats"
+    }
+
+    fn sees_doppler(&self) -> bool {
+        true
+    }
+
+    fn measures_speed(&self) -> bool {
+        self.down_fs > 0
+    }
+
+    fn numbers(&self, add: &mut dyn FnMut(&[u64])) {
+        add(&[self.up_fs as u64, self.down_fs as u64, self.settle_fs as u64]);
+        add(&[self.bandwidth.to_bits()]);
+    }
+
+    fn description(&self, number: fn(f64) -> String) -> Vec<String> {
+        let (ghz, us) = (self.bandwidth * 1e-9, s_from_fs(self.length_fs()) * 1e6);
+        let times: Vec<String> =
+            self.ramps().iter().map(|ramp| format!("{} us", number(ramp.seconds * 1e6))).collect();
+        let cell = number(range_from_tof(1.0 / self.bandwidth));
+        vec![
+            format!("a frequency that changes by {} GHz, in {} us", number(ghz), number(us)),
+            format!("recorded for {}: bins of {cell} m", times.join(" up and ")),
+            format!("line {} kHz wide", number(self.linewidth * 1e-3)),
+        ]
+    }
+}
+
 /// `[chirp]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -149,21 +207,56 @@ pub(super) struct ChirpFile {
     error_khz: Option<f64>,
 }
 
-impl ChirpFile {
-    /// True if it has no falling ramp.
-    pub(super) fn is_single(&self) -> bool {
-        self.down_us == Some(0.0)
+impl OptionalTable for ChirpFile {
+    fn idle(&self, _: &SensorFile) -> Vec<Idle> {
+        let no_pulse = ["tdc", "light.pulse_ps", "light.linewidth_ghz"];
+        let why = "light with a chirp has no pulses, and its line is that of chirp.linewidth_khz";
+        let mut idle = Idle::all(&no_pulse, "chirp", why);
+        let of_mode = ["optics.filter_nm", "optics.field"];
+        let why = "light of the mode of the laser alone makes a beat";
+        idle.extend(Idle::all(&of_mode, "chirp", why));
+        if self.down_us == Some(0.0) {
+            let (speed, why) = (["receiver.max_speed_m_s"], "a single ramp measures no speed");
+            idle.extend(Idle::all(&speed, "chirp.down_us", why));
+        }
+        idle
+    }
+
+    fn continuous(&self) -> Option<&dyn Continuous> {
+        Some(self)
+    }
+}
+
+impl Continuous for ChirpFile {
+    fn table(&self) -> &'static str {
+        "chirp"
+    }
+
+    fn varies(&self) -> &'static str {
+        "a frequency"
+    }
+
+    fn detector(&self) -> &'static str {
+        "coherent"
+    }
+
+    fn readout(&self, check: &Check, file: &SensorFile) -> Result<(Clock, Readout), Error> {
+        match &file.spectrum {
+            Some(spectrum) => check.spectrum(spectrum),
+            None => {
+                Err(check.chain.lacks("spectrum", "records the beats of a [chirp], and is missing"))
+            }
+        }
+    }
+
+    fn emission(&self, check: &Check, shot: Coding, farthest: f64) -> Result<Emission, Error> {
+        Ok(Emission::Chirped(check.chirp(self, shot, farthest)?))
     }
 }
 
 impl Check<'_> {
     /// The chirp, whose shots are `shot`; light is followed to `farthest` metres.
-    pub(super) fn chirp(
-        &self,
-        file: &ChirpFile,
-        shot: Coding,
-        farthest: f64,
-    ) -> Result<Chirp, Error> {
+    fn chirp(&self, file: &ChirpFile, shot: Coding, farthest: f64) -> Result<Chirp, Error> {
         let seconds = |key: &str, us: f64, least: f64| -> Result<f64, Error> {
             Ok(self.within(key, us, least, 1e5)? * 1e-6)
         };

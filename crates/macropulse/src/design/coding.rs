@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::emission::Model;
 use super::family::{FamilyFile, family};
 use super::limits::Check;
 use super::{Clock, Error, Scan};
@@ -97,6 +98,23 @@ impl Coding {
         match self.label {
             Some(Label::Column) => column,
             Some(Label::None) | None => 0,
+        }
+    }
+}
+
+impl Model for Coding {
+    fn coding(&self) -> &Coding {
+        self
+    }
+
+    fn length_fs(&self) -> i64 {
+        i64::from(self.codebook.chips()) * self.chip_fs
+    }
+
+    fn ambiguity(&self) -> &'static str {
+        match self.label {
+            Some(_) => "a code word comes again",
+            None => "by the detector alone: shots carry no code",
         }
     }
 }

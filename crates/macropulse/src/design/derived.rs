@@ -63,12 +63,12 @@ impl Derived {
             ),
             marks_per_scan: (mean * shots as f64).round() as u64,
             mean_overlap: macropulse / channel_period,
-            unambiguous_range: match design.emission.modulation() {
-                Some(modulation) => Some(range_from_tof(modulation.common_period())),
-                None => {
-                    design.is_coded().then(|| range_from_tof(word_period(design, channel_period)))
-                }
-            },
+            unambiguous_range: design
+                .emission
+                .model()
+                .repeats_after()
+                .or_else(|| design.is_coded().then(|| word_period(design, channel_period)))
+                .map(range_from_tof),
             tick_range: range_from_tof(s_from_fs(design.clock.tick_fs)),
             idle_listening_rate: at_once / (gate * shots as f64),
             reference_photons: design.detector.model().sensitivity().photons,

@@ -1,12 +1,6 @@
-//! The light of a shot: a macropulse, a burst of equal pulses, `[burst]`, or light whose power or frequency
-//! is modulated.
+//! The light of a shot: the list of its kinds, and the questions that each of them answers.
 
-use schemars::JsonSchema;
-use serde::Deserialize;
-
-use super::limits::Check;
-use super::{Chirp, Clock, Coding, Error, Modulation};
-use crate::units::{fs_from_s, s_from_fs};
+use super::{Burst, Chirp, Coding, Modulation};
 
 /// The light that a shot sends.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,26 +15,101 @@ pub enum Emission {
     Chirped(Chirp),
 }
 
-/// Equal pulses at a fixed interval.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Burst {
-    /// The pulse, as a code word of one mark.
-    pub pulse: Coding,
-    /// Pulses of a shot.
-    pub pulses: u32,
-    /// Time from pulse to pulse, fs: a whole number of ticks.
-    pub interval_fs: i64,
+/// The light of a shot of any kind.
+pub trait Model {
+    /// The code words, or the single pulse, that are sent once or repeatedly; of light without pulses its beginning.
+    fn coding(&self) -> &Coding;
+
+    /// Time from the beginning of a shot's first chip to the end of its last one, fs.
+    fn length_fs(&self) -> i64;
+
+    /// The stretches in which light without pulses shines; `None` of pulses.
+    fn exposures(&self) -> Option<Exposures> {
+        None
+    }
+
+    /// Parts of a shot that are recorded one by one.
+    fn recorded_parts(&self) -> u32 {
+        1
+    }
+
+    /// The largest share of a shot's energy that is sent within `seconds`, taking all of its marks
+    /// together: 1 of a macropulse.
+    fn share_within(&self, _seconds: f64) -> f64 {
+        1.0
+    }
+
+    /// How long a shot occupies its detector. `None` of a macropulse, which shares it with others.
+    fn occupancy(&self) -> Option<Occupancy> {
+        None
+    }
+
+    /// Time, s, after which echoes of the same shot look alike again; `None` if its code words decide that, or
+    /// if they never do.
+    fn repeats_after(&self) -> Option<f64> {
+        None
+    }
+
+    /// The event at the end of the unambiguous range, or its bound: a clause for people.
+    fn ambiguity(&self) -> &'static str {
+        "by the detector alone: shots carry no code"
+    }
+
+    /// True if the motion of a surface changes the record of its echo.
+    fn sees_doppler(&self) -> bool {
+        false
+    }
+
+    /// True if a speed can be told from the record of a shot.
+    fn measures_speed(&self) -> bool {
+        false
+    }
+
+    /// Gives `add` the numbers that decide what is sent, beside those of the code words.
+    fn numbers(&self, _add: &mut dyn FnMut(&[u64])) {}
+
+    /// Describes light other than a single macropulse line by line, for people. `number` writes numbers.
+    fn description(&self, _number: fn(f64) -> String) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// Stretches of equal length in which light without pulses shines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Exposures {
+    /// Their number.
+    pub count: u32,
+    /// How long each lasts, fs.
+    pub each_fs: i64,
+}
+
+/// The time for which a shot has its detector to itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Occupancy {
+    /// How long it is, fs.
+    pub fs: i64,
+    /// The table of the sensor file that decides it.
+    pub table: &'static str,
+    /// The part of it beside the light itself: a clause with a blank before it, or nothing.
+    pub with: &'static str,
+    /// How to shorten it.
+    pub remedy: &'static str,
 }
 
 impl Emission {
-    /// The code words, or the single pulse, that are sent once or repeatedly; of light without pulses its beginning.
-    pub fn coding(&self) -> &Coding {
+    /// The model of its kind.
+    pub fn model(&self) -> &dyn Model {
         match self {
             Self::Marks(coding) => coding,
-            Self::Burst(burst) => &burst.pulse,
-            Self::Modulated(modulation) => &modulation.shot,
-            Self::Chirped(chirp) => &chirp.shot,
+            Self::Burst(burst) => burst,
+            Self::Modulated(modulation) => modulation,
+            Self::Chirped(chirp) => chirp,
         }
+    }
+
+    /// As [`Model::coding`].
+    pub fn coding(&self) -> &Coding {
+        self.model().coding()
     }
 
     /// The burst, if it is one.
@@ -59,17 +128,9 @@ impl Emission {
         }
     }
 
-    /// The chirp, if the frequency of its light is modulated.
-    pub fn chirp(&self) -> Option<&Chirp> {
-        match self {
-            Self::Chirped(chirp) => Some(chirp),
-            _ => None,
-        }
-    }
-
     /// True if it sends pulses.
     pub fn is_pulsed(&self) -> bool {
-        matches!(self, Self::Marks(_) | Self::Burst(_))
+        self.model().exposures().is_none()
     }
 
     /// True if shots carry a code.
@@ -77,18 +138,9 @@ impl Emission {
         self.coding().label.is_some()
     }
 
-    /// Time from the beginning of a shot's first chip to the end of its last one, fs.
+    /// As [`Model::length_fs`].
     pub fn length_fs(&self) -> i64 {
-        match self {
-            Self::Modulated(modulation) => return modulation.length_fs(),
-            Self::Chirped(chirp) => return chirp.length_fs(),
-            Self::Marks(_) | Self::Burst(_) => {}
-        }
-        let coding = self.coding();
-        let word = i64::from(coding.codebook.chips()) * coding.chip_fs;
-        let repeated =
-            self.burst().map_or(0, |burst| i64::from(burst.pulses - 1) * burst.interval_fs);
-        repeated + word
+        self.model().length_fs()
     }
 
     /// Moments at which shots are fired are multiples of this, fs.
@@ -104,60 +156,12 @@ impl Emission {
 
     /// Parts of a shot that are sent one by one, the mean over its labels and words: pulses, exposures, or the whole shot.
     pub fn mean_parts(&self) -> f64 {
-        self.modulation().map_or_else(|| self.mean_pulses(), |it| f64::from(it.taps()))
+        let exposures = self.model().exposures();
+        exposures.map_or_else(|| self.mean_pulses(), |exposures| f64::from(exposures.count))
     }
 
     /// How long a part lasts, fs, where it is not a pulse.
     pub fn part_fs(&self) -> Option<i64> {
-        match self {
-            Self::Marks(_) | Self::Burst(_) => None,
-            Self::Modulated(modulation) => Some(modulation.exposure_fs),
-            Self::Chirped(chirp) => Some(chirp.length_fs()),
-        }
-    }
-
-    /// The largest share of a shot's energy that is sent within `seconds`, taking all of its marks
-    /// together: 1 of a macropulse.
-    pub fn share_within(&self, seconds: f64) -> f64 {
-        match self {
-            Self::Marks(_) => 1.0,
-            Self::Burst(burst) => {
-                let within = fs_from_s(seconds) / burst.interval_fs + 1;
-                (within as f64 / f64::from(burst.pulses)).min(1.0)
-            }
-            Self::Modulated(modulation) => modulation.share_within(seconds),
-            Self::Chirped(chirp) => (seconds / s_from_fs(chirp.length_fs())).min(1.0),
-        }
-    }
-}
-
-/// `[burst]` as typed.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct BurstFile {
-    /// Pulses of a shot.
-    #[schemars(range(min = 1, max = 16777216))]
-    pulses: u32,
-    /// Time from pulse to pulse, ns: a whole number of ticks.
-    #[schemars(range(min = 0.001, max = 1e6))]
-    interval_ns: f64,
-}
-
-impl Check<'_> {
-    /// The burst of `pulse`.
-    pub(super) fn burst(
-        &self,
-        file: &BurstFile,
-        pulse: Coding,
-        clock: Clock,
-    ) -> Result<Burst, Error> {
-        let key = "burst.interval_ns";
-        let interval_fs =
-            self.whole_fs(key, self.within(key, file.interval_ns, 1e-3, 1e6)? * 1e3)?;
-        if interval_fs % clock.tick_fs != 0 {
-            return self.refuse(key, "must be a whole number of ticks, of which a bin is one");
-        }
-        let pulses = self.count("burst.pulses", file.pulses, 1, 1 << 24)?;
-        Ok(Burst { pulse, pulses, interval_fs })
+        self.model().exposures().map(|exposures| exposures.each_fs)
     }
 }

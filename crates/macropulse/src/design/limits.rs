@@ -10,6 +10,13 @@ pub(super) struct Idle {
     pub why: &'static str,
 }
 
+impl Idle {
+    /// All of `keys`, for the same reason.
+    pub(super) fn all(keys: &[&str], by: &'static str, why: &'static str) -> Vec<Self> {
+        keys.iter().map(|key| Self { key: (*key).to_owned(), by, why }).collect()
+    }
+}
+
 /// Tests values, and tells where those that are wrong stand.
 pub(super) struct Check<'a> {
     pub chain: &'a Chain,

@@ -10,6 +10,7 @@
 
 mod band;
 mod budget;
+mod burst;
 mod check;
 mod chirp;
 mod coding;
@@ -17,18 +18,20 @@ mod derived;
 pub mod detector;
 mod document;
 mod effect;
-mod emission;
+pub mod emission;
 mod family;
+mod histogram;
 mod light;
 mod limits;
 mod modulation;
 mod presets;
-mod readout;
+pub mod readout;
 mod receiver;
 mod recorded;
 pub mod safety;
 mod scan;
 mod schema;
+mod spectrum;
 mod work;
 
 use std::path::Path;
@@ -36,27 +39,30 @@ use std::sync::OnceLock;
 
 pub use band::{MOST_SIGMA, PARTS_OF_TICK};
 pub use budget::{Budget, CoScanned, Field, solid_angle};
+pub use burst::Burst;
 pub use chirp::{Chirp, ChirpError};
 pub use coding::{Coding, Label};
 pub use derived::Derived;
 pub use detector::Detector;
 pub use document::{WITH, WITHOUT};
 pub use effect::Effect;
-pub use emission::{Burst, Emission};
+pub use emission::Emission;
 pub use family::family_from_toml;
+pub use histogram::Histogram;
 pub use light::Light;
 pub use modulation::{Modulation, Wave};
 pub use presets::{names as preset_names, text as preset_text};
-pub use readout::{Clock, Fidelity, Histogram, Readout, Spectrum, Tdc};
+pub use readout::{Clock, Readout, Tdc};
 pub use scan::{
     Directions, Extent, Firing, Flash, Gates, Grid, Laser, Mirror, Pattern, Polygon, Prism, Raster,
     Rosette, Scan, Spinning, Table,
 };
 pub use schema::schema;
+pub use spectrum::{Fidelity, Spectrum};
 pub use work::SHOTS_OF_BAND;
 
 use crate::digest::Digest;
-use macropulse_codec::decode::{Method, Receiver};
+use macropulse_codec::decode::Receiver;
 
 /// Keys of a sensor file that exclude each other, by their table. A table that has a name has exactly one of them;
 /// the front end tells which one stands at the top of the file, if any.
@@ -122,7 +128,7 @@ impl Design {
 
     /// True if its receiver measures radial velocities.
     pub fn measures_speed(&self) -> bool {
-        matches!(&self.receiver.method, Method::Beat(method) if method.ramps.len() > 1)
+        self.emission.model().measures_speed()
     }
 
     /// Detections per photon that reaches the detector. A sensor that declares its sensitivity leaves this open:

@@ -3,11 +3,14 @@
 use std::f64::consts::PI;
 
 use macropulse_codec::decode::phase::Tone;
+use macropulse_codec::{self as codec, Given, RecordKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::limits::Check;
-use super::{Coding, Error};
+use super::check::{Continuous, OptionalTable, SensorFile};
+use super::emission::{Exposures, Model, Occupancy};
+use super::limits::{Check, Idle};
+use super::{Clock, Coding, Emission, Error, Readout, readout};
 use crate::units::{fs_from_s, s_from_fs, tof_from_range};
 
 /// Modulation frequencies of a sensor at most.
@@ -19,6 +22,9 @@ const HARMONICS: usize = 63;
 /// An exposure is longer than the flight of light that is followed by this factor at least: light of the exposure
 /// before it is neglected.
 const LONGER: f64 = 20.0;
+
+/// Bytes of a tap in the memory of a run: its code, and the same once more while it is written.
+const PER_TAP: f64 = 4.0;
 
 /// Modulated light: exposure after exposure, each for a tap of one modulation frequency.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,27 +94,53 @@ impl Modulation {
         self.hz.len() as u32 * self.phases
     }
 
-    /// From the beginning of the first exposure to the end of the last one, fs.
-    pub fn length_fs(&self) -> i64 {
-        self.begins_fs(self.taps() - 1) + self.exposure_fs
-    }
-
     /// When the exposure of tap number `tap` begins, fs after the shot.
     pub fn begins_fs(&self, tap: u32) -> i64 {
         i64::from(tap) * (self.exposure_fs + self.gap_fs)
     }
 
-    /// The largest share of the light that is sent within `seconds`.
-    pub fn share_within(&self, seconds: f64) -> f64 {
+    /// The highest modulation frequency, Hz.
+    pub fn highest(&self) -> f64 {
+        self.hz.iter().fold(0.0, |most: f64, hz| most.max(*hz))
+    }
+}
+
+impl Model for Modulation {
+    fn coding(&self) -> &Coding {
+        &self.shot
+    }
+
+    /// From the beginning of the first exposure to the end of the last one.
+    fn length_fs(&self) -> i64 {
+        self.begins_fs(self.taps() - 1) + self.exposure_fs
+    }
+
+    fn exposures(&self) -> Option<Exposures> {
+        Some(Exposures { count: self.taps(), each_fs: self.exposure_fs })
+    }
+
+    fn recorded_parts(&self) -> u32 {
+        self.taps()
+    }
+
+    fn share_within(&self, seconds: f64) -> f64 {
         let (exposure, gap) = (s_from_fs(self.exposure_fs), s_from_fs(self.gap_fs));
         let whole = libm::floor(seconds / (exposure + gap));
         let rest = (seconds - whole * (exposure + gap)).min(exposure);
         ((whole * exposure + rest) / (f64::from(self.taps()) * exposure)).min(1.0)
     }
 
-    /// The time, s, after which the phases of all frequencies, taken to whole hertz, repeat: 1 over their greatest common
-    /// divisor.
-    pub fn common_period(&self) -> f64 {
+    fn occupancy(&self) -> Option<Occupancy> {
+        Some(Occupancy {
+            fs: self.length_fs(),
+            table: "modulation",
+            with: "",
+            remedy: "fewer taps, shorter exposures",
+        })
+    }
+
+    /// The phases of all frequencies, taken to whole hertz, repeat after 1 over their greatest common divisor.
+    fn repeats_after(&self) -> Option<f64> {
         let divisor = self.hz.iter().fold(0, |all: u64, hz| {
             let (mut one, mut other) = (all, hz.round().max(1.0) as u64);
             while other > 0 {
@@ -116,12 +148,26 @@ impl Modulation {
             }
             one
         });
-        1.0 / divisor.max(1) as f64
+        Some(1.0 / divisor.max(1) as f64)
     }
 
-    /// The highest modulation frequency, Hz.
-    pub fn highest(&self) -> f64 {
-        self.hz.iter().fold(0.0, |most: f64, hz| most.max(*hz))
+    fn ambiguity(&self) -> &'static str {
+        "the phases of all modulation frequencies repeat"
+    }
+
+    fn numbers(&self, add: &mut dyn FnMut(&[u64])) {
+        add(&[self.phases.into(), self.exposure_fs as u64]);
+        add(&[self.gap_fs as u64, self.wave as u64]);
+        self.hz.iter().for_each(|hz| add(&[hz.to_bits()]));
+    }
+
+    fn description(&self, number: fn(f64) -> String) -> Vec<String> {
+        let mhz: Vec<String> = self.hz.iter().map(|hz| number(hz * 1e-6)).collect();
+        let (ms, us) = (s_from_fs(self.length_fs()) * 1e3, s_from_fs(self.exposure_fs) * 1e6);
+        vec![
+            format!("modulated with {} MHz, in {} ms", mhz.join(", "), number(ms)),
+            format!("{} taps of each frequency, {} us long", self.phases, number(us)),
+        ]
     }
 }
 
@@ -145,16 +191,78 @@ pub(super) struct ModulationFile {
     wave: Option<Wave>,
 }
 
-impl ModulationFile {
-    /// True if it has no harmonics.
-    pub(super) fn is_sine(&self) -> bool {
-        self.wave.unwrap_or(Wave::Sine) == Wave::Sine
+impl OptionalTable for ModulationFile {
+    fn idle(&self, _: &SensorFile) -> Vec<Idle> {
+        let why = "modulated light has no pulses, and no event of it is timed";
+        let mut idle = Idle::all(&["tdc", "light.pulse_ps"], "modulation", why);
+        if self.wave.unwrap_or(Wave::Sine) == Wave::Sine {
+            let harmonics = ["receiver.correct_harmonics"];
+            idle.extend(Idle::all(&harmonics, "modulation.wave", "a sine has no harmonics"));
+        }
+        idle
+    }
+
+    fn continuous(&self) -> Option<&dyn Continuous> {
+        Some(self)
+    }
+}
+
+impl Continuous for ModulationFile {
+    fn table(&self) -> &'static str {
+        "modulation"
+    }
+
+    fn varies(&self) -> &'static str {
+        "a power"
+    }
+
+    fn detector(&self) -> &'static str {
+        "lock-in"
+    }
+
+    fn readout(&self, _: &Check, _: &SensorFile) -> Result<(Clock, Readout), Error> {
+        Ok((Clock::UNTIMED, Readout::Taps))
+    }
+
+    fn emission(&self, check: &Check, shot: Coding, farthest: f64) -> Result<Emission, Error> {
+        Ok(Emission::Modulated(check.modulation(self, shot, farthest)?))
+    }
+}
+
+/// A converter for each detector that reads its taps.
+pub(super) struct Taps;
+
+impl readout::Model for Taps {
+    fn records(&self) -> RecordKind {
+        RecordKind::Taps
+    }
+
+    fn tick_key(&self) -> &'static str {
+        "modulation"
+    }
+
+    fn why_nothing_is_found(&self) -> &'static str {
+        "the receiver found none of the echoes in the taps: too little light for the noise, or so much \
+         that the taps are full"
+    }
+
+    fn blank(&self, emission: &Emission, _: Clock) -> Option<Given> {
+        let taps = emission.model().recorded_parts();
+        Some(Given::Taps(codec::Taps { taps, codes: vec![0; taps as usize] }))
+    }
+
+    fn bytes_of_part(&self) -> Option<f64> {
+        Some(PER_TAP)
+    }
+
+    fn unshared(&self) -> &'static str {
+        "every pixel has taps of its own, which are never busy"
     }
 }
 
 impl Check<'_> {
     /// The modulation, whose shots are `shot`; light is followed to `farthest` metres.
-    pub(super) fn modulation(
+    fn modulation(
         &self,
         file: &ModulationFile,
         shot: Coding,

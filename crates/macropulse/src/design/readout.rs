@@ -1,18 +1,15 @@
-//! The record of a sensor, and the clock by which it is made: `[tdc]`, `[adc]`, `[histogram]`, `[spectrum]`,
-//! or the taps of modulated light.
+//! The record of a sensor, and the clock by which it is made. This file lists the readouts and the questions
+//! that each of them answers. It has those of detection events and signals: `[tdc]` and `[adc]`.
 
-use std::sync::Arc;
-
-use macropulse_codec::RecordKind;
-use macropulse_codec::decode::beat::SpectralWindow;
-use macropulse_codec::decode::histogram::Pulse;
+use macropulse_codec::{Given, RecordKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::band::TOO_FINE;
 use super::limits::Check;
-use super::{Chirp, Error, Scan};
-use crate::units::{FS_PER_S, fs_from_s, tof_from_range};
+use super::modulation::Taps;
+use super::{Emission, Error, Histogram, Scan, Spectrum};
+use crate::units::fs_from_s;
 
 /// `[tdc]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -45,6 +42,11 @@ pub struct Clock {
     pub period_fs: i64,
 }
 
+impl Clock {
+    /// The clock of a sensor that times no events: its range gate ends to 1.5 mm.
+    pub(super) const UNTIMED: Self = Self { tick_fs: 10_000, period_fs: 10_000 };
+}
+
 /// The part behind the detectors that makes the record for the receiver.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Readout {
@@ -60,7 +62,65 @@ pub enum Readout {
     Spectrum(Spectrum),
 }
 
+/// A readout of any kind.
+pub trait Model {
+    /// The kind of record that it makes.
+    fn records(&self) -> RecordKind;
+
+    /// The key that says how long a tick is.
+    fn tick_key(&self) -> &'static str;
+
+    /// Time, fs, for which its state depends on the events that it was given.
+    fn memory_fs(&self) -> i64 {
+        0
+    }
+
+    /// Bytes that a run takes for each recorded part of a shot; `None` where the record is not made shot by shot.
+    fn bytes_of_part(&self) -> Option<f64> {
+        None
+    }
+
+    /// Bandwidth, Hz, in which it sees the light of a single mode; `None` where the optics choose the light.
+    fn bandwidth_of_mode(&self) -> Option<f64> {
+        None
+    }
+
+    /// A clause for people: each detector or pixel has this for itself, which is never busy. Empty of a bank that
+    /// they share.
+    fn unshared(&self) -> &'static str {
+        ""
+    }
+
+    /// Why a receiver finds nothing in its record of light: a sentence for people.
+    fn why_nothing_is_found(&self) -> &'static str;
+
+    /// The record of one shot in which nothing was detected, of a shot that sends such light; `None` of a record that
+    /// is not made shot by shot.
+    fn blank(&self, _emission: &Emission, _clock: Clock) -> Option<Given> {
+        None
+    }
+
+    /// Gives `add` the numbers that decide how its record is decoded, beside those of the clock.
+    fn numbers(&self, _add: &mut dyn FnMut(&[u64])) {}
+}
+
 impl Readout {
+    /// The model of its kind.
+    pub fn model(&self) -> &dyn Model {
+        match self {
+            Self::Tdc(tdc) => tdc,
+            Self::Adc => &Adc,
+            Self::Histogram(histogram) => histogram,
+            Self::Taps => &Taps,
+            Self::Spectrum(spectrum) => spectrum,
+        }
+    }
+
+    /// The kind of record that it makes.
+    pub fn records(&self) -> RecordKind {
+        self.model().records()
+    }
+
     /// The bank of time-to-digital converters, if it is one.
     pub fn tdc(&self) -> Option<&Tdc> {
         match self {
@@ -75,78 +135,6 @@ impl Readout {
             Self::Histogram(histogram) => Some(histogram),
             _ => None,
         }
-    }
-
-    /// The kind of record that it makes.
-    pub fn records(&self) -> RecordKind {
-        match self {
-            Self::Tdc(_) => RecordKind::Ticks,
-            Self::Adc => RecordKind::Samples,
-            Self::Histogram(_) => RecordKind::Histograms,
-            Self::Taps => RecordKind::Taps,
-            Self::Spectrum(_) => RecordKind::Beats,
-        }
-    }
-
-    /// The key that says how long a tick is.
-    pub(super) fn tick_key(&self) -> &'static str {
-        match self {
-            Self::Tdc(_) => "tdc.resolution_ps",
-            Self::Adc => "adc.sample_ps",
-            Self::Histogram(_) => "histogram.bin_ps",
-            Self::Taps => "modulation",
-            Self::Spectrum(_) => "chirp",
-        }
-    }
-
-    /// Why a receiver finds nothing in its record of light, in a sentence.
-    pub fn why_nothing_is_found(&self) -> &'static str {
-        match self {
-            Self::Tdc(_) => "the receiver decoded none of the macropulses; the rejects say why",
-            Self::Adc => {
-                "the receiver found none of the echoes in the samples: too little light for the noise, or \
-                 the channel was blind with its own light"
-            }
-            Self::Histogram(_) => {
-                "the receiver found none of the echoes in the histograms: too little light for the \
-                 background"
-            }
-            Self::Taps => {
-                "the receiver found none of the echoes in the taps: too little light for the noise, or so much \
-                 that the taps are full"
-            }
-            Self::Spectrum(_) => {
-                "the receiver found none of the echoes in the peaks of the spectra: too little light for the noise, or \
-                 a laser whose line is too broad"
-            }
-        }
-    }
-
-    /// Time, fs, for which its state depends on the events that it was given.
-    pub(super) fn memory_fs(&self) -> i64 {
-        self.tdc().map_or(0, Tdc::memory_fs)
-    }
-}
-
-/// The histogram of a shot. Its bins are ticks of the sensor's clock; the first begins with each pulse.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Histogram {
-    /// Bins.
-    pub bins: u32,
-    /// Counts of a pulse of the sensor, bin by bin, where they are measured.
-    pub pulse: Option<Arc<[f64]>>,
-}
-
-impl Histogram {
-    /// A pulse of the sensor as it is recorded: the one that was measured, sent in the middle of its highest bin, or a
-    /// Gaussian one of `rms` seconds.
-    pub fn pulse(&self, rms: f64) -> Pulse {
-        let Some(measured) = &self.pulse else {
-            return Pulse::Gaussian { rms_fs: rms * FS_PER_S as f64 };
-        };
-        let higher = |peak: usize, at: usize| if measured[at] > measured[peak] { at } else { peak };
-        let peak = (0..measured.len()).fold(0, higher);
-        Pulse::Measured { counts: measured.to_vec(), origin: peak as f64 + 0.5 }
     }
 }
 
@@ -174,89 +162,6 @@ pub(super) struct AdcFile {
     pub step_photons: f64,
 }
 
-/// `[histogram]` as typed.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct HistogramFile {
-    /// Width of a bin, ps: a whole number of femtoseconds; the tick of this sensor.
-    #[schemars(range(min = 0.001, max = 1e9))]
-    bin_ps: f64,
-    /// Number of bins. The first one begins when a pulse is sent.
-    #[schemars(range(min = 1, max = 65536))]
-    bins: u32,
-    /// A pulse of the sensor as it records it, light and detector together: counts of a reference path without
-    /// background, bin by bin. It is sent in the middle of its highest bin. In place of the Gaussian pulse of
-    /// `light.pulse_ps` and the jitter.
-    #[schemars(length(min = 1, max = 4096), inner(range(min = 0, max = 1e12)))]
-    pub pulse: Option<Vec<f64>>,
-}
-
-/// `[spectrum]` as typed.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SpectrumFile {
-    /// Samples taken per second, in millions.
-    #[schemars(range(min = 0.001, max = 1e6))]
-    sample_msps: f64,
-    /// The window over a ramp.
-    window: SpectralWindow,
-    /// Peaks recorded of a ramp at most, the strongest ones.
-    #[schemars(range(min = 1, max = 256))]
-    peaks: u32,
-    /// Peaks of noise that are recorded of a ramp on average; the least power that is recorded follows from it.
-    #[schemars(range(min = 1e-9, max = 100))]
-    false_peaks: f64,
-    /// How spectra are simulated. Left out: `waveform`.
-    fidelity: Option<Fidelity>,
-}
-
-/// How spectra are simulated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Fidelity {
-    /// Sample by sample.
-    Waveform,
-    /// Bin by bin, and only where there is something to see: much faster, and for ideal chirps alone.
-    Spectrum,
-}
-
-/// The spectra of the ramps of a shot.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spectrum {
-    /// Samples taken per second.
-    pub sample_hz: f64,
-    /// The window over a ramp.
-    pub window: SpectralWindow,
-    /// Peaks recorded of a ramp at most.
-    pub peaks: u32,
-    /// Peaks of noise that are recorded of a ramp on average.
-    pub false_peaks: f64,
-    /// How it is simulated.
-    pub fidelity: Fidelity,
-}
-
-/// Samples of a ramp: at least and at most.
-const SAMPLES: (f64, f64) = (64.0, 65_536.0);
-
-impl Spectrum {
-    /// Returns the number of samples of a ramp that is recorded for `seconds`.
-    pub fn samples(&self, seconds: f64) -> u32 {
-        (self.sample_hz * seconds).round() as u32
-    }
-
-    /// By how much less precisely a beat is measured behind the window than by all samples alike. For a window w(t) it is
-    /// √(∫w²t² dt·∫t² dt)/∫w·t² dt.
-    pub fn loss_of_precision(&self) -> f64 {
-        match self.window {
-            SpectralWindow::None => 1.0,
-            SpectralWindow::Hann => 1.530_3,
-        }
-    }
-}
-
-/// Tick of the clock of a sensor of modulated light, fs: no time is measured by it, and its range gate ends to 1.5 mm.
-const TICK_OF_TAPS_FS: i64 = 10_000;
-
 /// Converters start this number of dead times before the first ticks of a band, as Geiger cells do.
 const DEAD_TIMES: i64 = 4;
 
@@ -270,11 +175,46 @@ impl Tdc {
     pub fn share(&self, channels: u32) -> Self {
         Self { converters: self.converters / channels, ..*self }
     }
+}
 
-    /// Time, fs, for which the state of the bank depends on the events that it was given. All converters are
-    /// free in the beginning, which they are after each dead time in which few events come.
+impl Model for Tdc {
+    fn records(&self) -> RecordKind {
+        RecordKind::Ticks
+    }
+
+    fn tick_key(&self) -> &'static str {
+        "tdc.resolution_ps"
+    }
+
+    fn why_nothing_is_found(&self) -> &'static str {
+        "the receiver decoded none of the macropulses; the rejects say why"
+    }
+
+    /// All converters are free in the beginning, which they are after each dead time in which few events come.
     fn memory_fs(&self) -> i64 {
         DEAD_TIMES * self.dead_fs
+    }
+}
+
+/// A converter for each detector that samples its signal.
+struct Adc;
+
+impl Model for Adc {
+    fn records(&self) -> RecordKind {
+        RecordKind::Samples
+    }
+
+    fn tick_key(&self) -> &'static str {
+        "adc.sample_ps"
+    }
+
+    fn why_nothing_is_found(&self) -> &'static str {
+        "the receiver found none of the echoes in the samples: too little light for the noise, or \
+         the channel was blind with its own light"
+    }
+
+    fn unshared(&self) -> &'static str {
+        "every detector has an ADC of its own, which is never busy"
     }
 }
 
@@ -282,102 +222,13 @@ impl Check<'_> {
     /// Refuses ticks, or samples, that are too fine: 2²⁶ of them do not hold the echoes of a shot and of
     /// those in flight with it.
     pub(super) fn too_fine<T>(&self, readout: &Readout) -> Result<T, Error> {
-        self.refuse(readout.tick_key(), TOO_FINE)
+        self.refuse(readout.model().tick_key(), TOO_FINE)
     }
 
     /// Clock and readout of a detector whose signal is sampled.
     pub(super) fn adc(&self, file: &AdcFile) -> Result<(Clock, Readout), Error> {
         let tick_fs = self.whole_fs("adc.sample_ps", file.sample_ps)?;
         Ok((Clock { tick_fs, period_fs: tick_fs }, Readout::Adc))
-    }
-
-    /// Clock and readout of a detector of whose samples spectra are taken.
-    pub(super) fn spectrum(&self, file: &SpectrumFile) -> Result<(Clock, Readout), Error> {
-        let msps = self.within("spectrum.sample_msps", file.sample_msps, 1e-3, 1e6)?;
-        let spectrum = Spectrum {
-            sample_hz: msps * 1e6,
-            window: file.window,
-            peaks: self.count("spectrum.peaks", file.peaks, 1, 256)?,
-            false_peaks: self.within("spectrum.false_peaks", file.false_peaks, 1e-9, 100.0)?,
-            fidelity: file.fidelity.unwrap_or(Fidelity::Waveform),
-        };
-        Ok((self.of_taps().0, Readout::Spectrum(spectrum)))
-    }
-
-    /// Refuses a `spectrum` that does not hold the beats of the ramps of a `chirp`. These are beats of
-    /// surfaces up to `farthest` metres that move by up to `fastest` m/s, at this wavelength.
-    pub(super) fn bins(
-        &self,
-        spectrum: &Spectrum,
-        chirp: &Chirp,
-        (farthest, fastest, wavelength): (f64, f64, f64),
-    ) -> Result<(), Error> {
-        let key = "spectrum.sample_msps";
-        for ramp in chirp.ramps() {
-            let (samples, (least, most)) = (spectrum.sample_hz * ramp.seconds, SAMPLES);
-            if !(least..=most).contains(&samples) {
-                let message = format!(
-                    "takes {samples:.0} samples of a ramp of {} µs, where {least} to {most} are possible",
-                    ramp.seconds * 1e6
-                );
-                return self.refuse(key, message);
-            }
-            if (samples - samples.round()).abs() > 1e-3 {
-                let message = format!(
-                    "takes {samples:.3} samples of a ramp of {} µs: choose it so that this is a whole number",
-                    ramp.seconds * 1e6
-                );
-                return self.refuse(key, message);
-            }
-            let highest = ramp.slope() * tof_from_range(farthest) + 2.0 * fastest / wavelength;
-            if 2.0 * highest > spectrum.sample_hz {
-                let message = format!(
-                    "is {}, but the beat of a surface at {farthest} m that moves by {fastest} m/s is {:.1} MHz: \
-                     {:.1} or more",
-                    spectrum.sample_hz * 1e-6,
-                    highest * 1e-6,
-                    (2.0 * highest * 1e-5).ceil() * 0.1
-                );
-                return self.refuse(key, message);
-            }
-        }
-        if spectrum.fidelity == Fidelity::Spectrum && !chirp.is_ideal() {
-            let message = "`spectrum` is exact for ideal chirps alone: `waveform`, or chirp.linewidth_khz and \
-                           chirp.error_mhz of 0";
-            return self.refuse("spectrum.fidelity", message);
-        }
-        Ok(())
-    }
-
-    /// Clock and readout of a detector whose taps are read.
-    pub(super) fn of_taps(&self) -> (Clock, Readout) {
-        (Clock { tick_fs: TICK_OF_TAPS_FS, period_fs: TICK_OF_TAPS_FS }, Readout::Taps)
-    }
-
-    /// Clock and readout of a detector whose counts go into a histogram.
-    pub(super) fn histogram(&self, file: &HistogramFile) -> Result<(Clock, Readout), Error> {
-        let tick_fs = self.whole_fs("histogram.bin_ps", file.bin_ps)?;
-        let bins = self.count("histogram.bins", file.bins, 1, 65_536)?;
-        let clock = Clock { tick_fs, period_fs: tick_fs };
-        let pulse = file.pulse.as_ref().map(|counts| self.measured(counts)).transpose()?;
-        Ok((clock, Readout::Histogram(Histogram { bins, pulse })))
-    }
-
-    /// A pulse that was measured.
-    fn measured(&self, counts: &[f64]) -> Result<Arc<[f64]>, Error> {
-        let key = "histogram.pulse";
-        let most = Pulse::MOST_BINS;
-        if !(1..=most).contains(&counts.len()) {
-            return self
-                .refuse(key, format!("has {} counts, but can have 1 to {most}", counts.len()));
-        }
-        for count in counts {
-            self.within(key, *count, 0.0, 1e12)?;
-        }
-        if counts.iter().all(|count| *count == 0.0) {
-            return self.refuse(key, "has no light: a count must be above 0");
-        }
-        Ok(counts.into())
     }
 
     /// Clock and readout of a detector whose events are timed.

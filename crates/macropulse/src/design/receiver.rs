@@ -3,23 +3,14 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::detector::{Arming, Coherent, DetectorFile, Geiger, LockIn, Sampled};
+use super::detector::DetectorFile;
 use super::limits::Check;
-use super::{Clock, Coding, Emission, Error, Label, PARTS_OF_TICK, Readout, Scan};
+use super::{Clock, Coding, Detector, Emission, Error, Label, PARTS_OF_TICK, Readout, Scan};
 use crate::units::{fs_from_s, tof_from_range};
 use macropulse_codec::RecordKind;
-use macropulse_codec::decode::histogram::PileUp;
 use macropulse_codec::decode::{
-    self, Bitwise, Correlation, Effort, HistogramMethod, MOST_RETURNS, Method, Opening, Pick,
-    Receiver, ReceiverKind,
+    self, Bitwise, Correlation, Effort, MOST_RETURNS, Method, Opening, Pick, Receiver, ReceiverKind,
 };
-
-/// Marks by which a receiver of samples decides at least if its file does not say: one alone may be that of
-/// any shot.
-const LEAST_MARKS: u32 = 2;
-
-/// Radial velocity at most, m/s, if a file does not say: of two cars at 108 km/h that meet.
-const MAX_SPEED: f64 = 60.0;
 
 /// `[receiver]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -47,34 +38,34 @@ pub(super) struct ReceiverFile {
     /// Least number of marks by which a return is decided, none of them blanked (sampled). 2 if it is not
     /// given, or 1 if a word has only one; at most the marks of the word with the fewest.
     #[schemars(range(min = 1))]
-    least_marks: Option<u32>,
+    pub least_marks: Option<u32>,
     /// For how long after each mark that is sent no sample counts, ns (sampled).
     #[schemars(range(min = 0, max = 1e6))]
-    blank_ns: f64,
+    pub blank_ns: f64,
     /// For how long behind a clipped sample none counts, ns (sampled).
     #[schemars(range(min = 0, max = 1e6))]
-    recovery_ns: f64,
+    pub recovery_ns: f64,
     /// How photons that a cell missed behind others of the same pulse are made up for (histogram): `coates`
     /// with arming = "once-per-pulse" unless it is given, else `none`.
-    pile_up: Option<PileUpFile>,
+    pub pile_up: Option<PileUpFile>,
     /// Standard deviation of the shape of a pulse, as a share of its height (histogram); 0 if it is not given.
     #[schemars(range(min = 0, max = 1))]
-    shape_error: Option<f64>,
+    pub shape_error: Option<f64>,
     /// Least share of the photons (histogram) or of the power (beat) of the strongest return that another
     /// return must have. Left out: 0.
     #[schemars(range(min = 0, max = 1))]
-    least_share: Option<f64>,
+    pub least_share: Option<f64>,
     /// True if the phase error made by harmonics of the modulation is corrected (phase). True if it is not
     /// given.
-    correct_harmonics: Option<bool>,
+    pub correct_harmonics: Option<bool>,
     /// Radial velocity of a surface at most, m/s (beat); 60 if it is not given.
     #[schemars(range(min = 0, max = 1e4))]
-    max_speed_m_s: Option<f64>,
+    pub max_speed_m_s: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-enum PileUpFile {
+pub(super) enum PileUpFile {
     /// Counts are taken as they are.
     None,
     /// By the counts of the bins before, of cells that count once a pulse.
@@ -110,7 +101,9 @@ pub(super) const OWN_KEYS: [(&[&str], &[ReceiverKind], &str); 8] = {
 
 /// The inputs of a receiver beside its own section of the file.
 pub(super) struct Inputs<'a> {
-    pub detector: &'a DetectorFile,
+    pub detector_file: &'a DetectorFile,
+    /// The detector; `None` if something is wrong with it.
+    pub detector: Option<&'a Detector>,
     pub scan: &'a Scan,
     pub clock: Clock,
     pub readout: &'a Readout,
@@ -119,14 +112,6 @@ pub(super) struct Inputs<'a> {
     pub timing: f64,
     /// As [`Correlation::photons_apart`].
     pub photons_apart: bool,
-    /// The detector, where it is sampled.
-    pub sampled: Option<&'a Sampled>,
-    /// The detector, where it counts photons in cells.
-    pub counting: Option<&'a Geiger>,
-    /// The detector, where its taps are read.
-    pub lock_in: Option<&'a LockIn>,
-    /// The detector, where its beats are recorded.
-    pub coherent: Option<&'a Coherent>,
     /// rms length of a pulse of light with the jitter, s.
     pub pulse: f64,
 }
@@ -138,7 +123,7 @@ impl Check<'_> {
         file: &ReceiverFile,
         inputs: &Inputs,
     ) -> Result<Option<Receiver>, Error> {
-        let &Inputs { detector, scan, clock, readout, emission, .. } = inputs;
+        let &Inputs { detector_file, scan, clock, readout, emission, .. } = inputs;
         let coding = emission.coding();
         let kind = file.kind;
         if kind.record() != readout.records() {
@@ -156,7 +141,7 @@ impl Check<'_> {
             );
         }
         self.can_read(kind, coding)?;
-        let (returns, pick) = self.returns(file, detector)?;
+        let (returns, pick) = self.returns(file, detector_file)?;
         let ticks = |range: f64| fs_from_s(tof_from_range(range)) / clock.tick_fs;
         let gate = (ticks(scan.min_range), ticks(scan.max_range));
         let light = ticks(scan.light_range);
@@ -187,7 +172,7 @@ impl Check<'_> {
         inputs: &Inputs,
         light_ticks: u32,
     ) -> Result<Option<Method>, Error> {
-        let &Inputs { clock, emission, timing, photons_apart, sampled, .. } = inputs;
+        let &Inputs { clock, emission, timing, photons_apart, .. } = inputs;
         let coding = emission.coding();
         let Ok(ticks_per_chip) = u32::try_from(coding.chip_fs / clock.tick_fs) else {
             let most = u32::MAX;
@@ -211,76 +196,11 @@ impl Check<'_> {
             ReceiverKind::Matched => Method::Matched(correlation, file.effort),
             ReceiverKind::Balanced => Method::Balanced(correlation),
             ReceiverKind::Direct => Method::Direct,
+            ReceiverKind::Sampled => return self.of_samples(file, inputs, &correlation),
             ReceiverKind::Histogram => return self.of_histograms(file, inputs, false_alarm),
-            ReceiverKind::Phase => {
-                let corrects = file.correct_harmonics.unwrap_or(true);
-                return Ok(inputs
-                    .lock_in
-                    .map(|it| Method::Phase(it.method(corrects, false_alarm))));
-            }
-            ReceiverKind::Beat => {
-                let Some(coherent) = inputs.coherent else { return Ok(None) };
-                let path = "receiver.max_speed_m_s";
-                let fastest = file.max_speed_m_s.unwrap_or(MAX_SPEED);
-                let fastest = self.within(path, fastest, 0.0, 1e4)?;
-                let share = file.least_share.unwrap_or(0.0);
-                let share = self.within("receiver.least_share", share, 0.0, 1.0)?;
-                let method = coherent.method(share, fastest, false_alarm);
-                let edge = (inputs.scan.max_range, fastest, coherent.wavelength);
-                self.bins(&coherent.spectrum, &coherent.chirp, edge)?;
-                Method::Beat(method)
-            }
-            ReceiverKind::Sampled => {
-                let Some(sampled) = sampled else { return Ok(None) };
-                let least = match file.least_marks {
-                    Some(typed) => self.count("receiver.least_marks", typed, 1, lightest)?,
-                    None => LEAST_MARKS.min(lightest),
-                };
-                let ns = |key, value| -> Result<f64, Error> {
-                    Ok(self.within(key, value, 0.0, 1e6)? * 1e-9)
-                };
-                let blank = ns("receiver.blank_ns", file.blank_ns)?;
-                let recovery = ns("receiver.recovery_ns", file.recovery_ns)?;
-                let sampling = sampled.sampling((blank, recovery), least as u16);
-                Method::Sampled(decode::Sampled {
-                    ticks_per_chip,
-                    light_ticks,
-                    false_alarm,
-                    sampling,
-                })
-            }
+            ReceiverKind::Phase => return self.of_taps(file, inputs, false_alarm),
+            ReceiverKind::Beat => return self.of_beats(file, inputs, false_alarm),
         }))
-    }
-
-    /// How it decodes histograms; `None` without one.
-    fn of_histograms(
-        &self,
-        file: &ReceiverFile,
-        inputs: &Inputs,
-        false_alarm: f64,
-    ) -> Result<Option<Method>, Error> {
-        let Some(histogram) = inputs.readout.histogram() else { return Ok(None) };
-        let cells = inputs.counting.map_or(1, |geiger| geiger.cells);
-        let piles_up = inputs.counting.is_some_and(|geiger| geiger.arming == Arming::OncePerPulse);
-        let pile_up = match (file.pile_up, piles_up) {
-            (Some(PileUpFile::Coates), false) => {
-                return self.refuse(
-                    "receiver.pile_up",
-                    "`coates` corrects cells that count once a pulse: arming = \"once-per-pulse\", or \"none\"",
-                );
-            }
-            (Some(PileUpFile::None), _) | (None, false) => PileUp::None,
-            (Some(PileUpFile::Coates) | None, true) => PileUp::Coates,
-        };
-        let share = |key, typed: Option<f64>| self.within(key, typed.unwrap_or(0.0), 0.0, 1.0);
-        Ok(Some(Method::Histogram(HistogramMethod {
-            pile_up,
-            cells,
-            pulse: histogram.pulse(inputs.pulse),
-            false_alarm,
-            shape_error: share("receiver.shape_error", file.shape_error)?,
-            least_share: share("receiver.least_share", file.least_share)?,
-        })))
     }
 
     /// How many returns a shot may have at most, and which are kept of more.

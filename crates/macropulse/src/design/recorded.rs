@@ -2,10 +2,10 @@
 
 use macropulse_codec::decode::{self, Returns};
 use macropulse_codec::files::{Digest, Limits, SampleHeader};
-use macropulse_codec::{Beats, Given, Histograms, Peak, Record, RecordKind, ShotLog, Taps};
+use macropulse_codec::{Given, Record, RecordKind, ShotLog};
 
+use super::Design;
 use super::detector::Detector;
-use super::{Design, Emission, Readout};
 
 /// Shots of a scan whose places and times go into the digest.
 const SAMPLES: u64 = 256;
@@ -64,28 +64,7 @@ impl Design {
 
     /// The record of one shot in which nothing was detected; `None` of a sensor whose record is not made shot by shot.
     pub fn blank_record(&self) -> Option<Given> {
-        let blank = match (&self.readout, &self.emission) {
-            (Readout::Histogram(histogram), Emission::Burst(burst)) => {
-                Given::Histograms(Histograms {
-                    bin_fs: self.clock.tick_fs,
-                    offset_fs: 0,
-                    bins: histogram.bins,
-                    cycles: vec![burst.pulses],
-                    counts: vec![0; histogram.bins as usize],
-                })
-            }
-            (Readout::Taps, Emission::Modulated(modulation)) => {
-                let taps = modulation.taps();
-                Given::Taps(Taps { taps, codes: vec![0; taps as usize] })
-            }
-            (Readout::Spectrum(spectrum), Emission::Chirped(chirp)) => {
-                let (ramps, peaks) = (chirp.ramps().len() as u32, spectrum.peaks);
-                let found = vec![Peak::EMPTY; (ramps * peaks) as usize];
-                Given::Beats(Beats { ramps, peaks, found })
-            }
-            _ => return None,
-        };
-        Some(blank)
+        self.readout.model().blank(&self.emission, self.clock)
     }
 
     /// Returns the hash of all that is sent and how it is timed. It covers the codebook chip by chip, the
@@ -121,19 +100,8 @@ impl Design {
             numbers(&[self.emission.coding().label_of(column).into()]);
         }
         let (pattern, shots) = (scan.model(), self.shots_per_scan());
-        if let Some(burst) = self.emission.burst() {
-            numbers(&[burst.pulses.into(), burst.interval_fs as u64]);
-        }
-        if let Some(modulation) = self.emission.modulation() {
-            numbers(&[modulation.phases.into(), modulation.exposure_fs as u64]);
-            numbers(&[modulation.gap_fs as u64, modulation.wave as u64]);
-            modulation.hz.iter().for_each(|hz| numbers(&[hz.to_bits()]));
-        }
-        if let Detector::Coherent(coherent) = &self.detector {
-            let chirp = &coherent.chirp;
-            numbers(&[chirp.up_fs as u64, chirp.down_fs as u64, chirp.settle_fs as u64]);
-            numbers(&[chirp.bandwidth.to_bits(), coherent.spectrum.window as u64]);
-        }
+        self.emission.model().numbers(&mut numbers);
+        self.readout.model().numbers(&mut numbers);
         for sample in 0..SAMPLES.min(shots) {
             let order = sample * shots / SAMPLES.min(shots);
             let (row, column) = pattern.pixel(order);

@@ -8,12 +8,13 @@
 
 use std::f64::consts::TAU;
 
-use macropulse_codec::{ShotLog, Taps};
+use macropulse_codec::{Given, ShotLog, Taps};
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
-use super::own_by_shot;
+use super::{ShotRecorder, own_by_shot};
 use crate::channel::Light;
 use crate::design::detector::LockIn;
+use crate::design::emission::Model;
 use crate::design::{Design, Modulation};
 use crate::random::{Chance, Stage};
 use crate::units::s_from_fs;
@@ -26,13 +27,18 @@ pub(super) struct Demodulator {
     efficiency: f64,
 }
 
+impl ShotRecorder for Demodulator {
+    fn record(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Given {
+        Given::Taps(self.taps(chance, log, light))
+    }
+}
+
 impl Demodulator {
     pub fn new(lock_in: &LockIn, design: &Design) -> Self {
         Self { lock_in: lock_in.clone(), efficiency: design.efficiency() }
     }
 
-    /// The taps of the owned shots of `log`, in their order.
-    pub fn taps(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Taps {
+    fn taps(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Taps {
         let (own, others) = (own_by_shot(light), pulses_of_others(light));
         let taps = self.lock_in.modulation.taps();
         let steady = self.lock_in.dark + light.background.steady * self.efficiency;

@@ -28,7 +28,7 @@ use std::ops::Range;
 
 pub use marks::{Marks, Response};
 
-use macropulse_codec::{Beats, Histograms, Samples, ShotLog, Taps};
+use macropulse_codec::{Given, Samples, ShotLog};
 
 use channel::{Arrangement, Channel};
 use clock::Clock;
@@ -78,12 +78,14 @@ enum Work {
     Events(Box<dyn Kind>),
     /// Samples.
     Samples(Box<Sampler>),
-    /// Histograms of counts.
-    Histograms(Box<Accumulator>),
-    /// Taps.
-    Taps(Box<Demodulator>),
-    /// Beats.
-    Beats(Box<Mixer>),
+    /// A record of each shot.
+    ByShot(Box<dyn ShotRecorder>),
+}
+
+/// A detector at work whose record of a shot is made of the light of that shot alone.
+trait ShotRecorder: fmt::Debug + Send + Sync {
+    /// The record of the owned shots of `log`, in their order.
+    fn record(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Given;
 }
 
 /// A kind of detector at work.
@@ -113,14 +115,15 @@ impl<'a> Detectors<'a> {
     /// The detectors of `design` where it is `operating`, with the random numbers of `chance`.
     pub fn new(design: &'a Design, operating: &Operating, chance: Chance) -> Self {
         let sunlight = operating.background;
+        let by_shot = |recorder| Self { design, chance, shape: None, work: Work::ByShot(recorder) };
         let kind: Box<dyn Kind> = match &design.detector {
             Detector::PhotonCounting(counting) => Box::new(Counting::new(counting, design)),
             Detector::Geiger(geiger) => {
                 if let (Some(burst), Some(histogram)) =
                     (design.emission.burst(), design.readout.histogram())
                 {
-                    let work = Box::new(Accumulator::new(geiger, (burst, histogram), design));
-                    return Self { design, chance, shape: None, work: Work::Histograms(work) };
+                    let cells = Accumulator::new(geiger, (burst, histogram), design);
+                    return by_shot(Box::new(cells));
                 }
                 Box::new(Cells::new(geiger))
             }
@@ -132,12 +135,10 @@ impl<'a> Detectors<'a> {
                 }
             }
             Detector::LockIn(lock_in) => {
-                let work = Box::new(Demodulator::new(lock_in, design));
-                return Self { design, chance, shape: None, work: Work::Taps(work) };
+                return by_shot(Box::new(Demodulator::new(lock_in, design)));
             }
             Detector::Coherent(coherent) => {
-                let work = Box::new(Mixer::new(coherent, design, sunlight));
-                return Self { design, chance, shape: None, work: Work::Beats(work) };
+                return by_shot(Box::new(Mixer::new(coherent, design, sunlight)));
             }
             Detector::SingleStop(firing) => Box::new(firing.setting(sunlight)),
             Detector::Sampled(sampled) => {
@@ -179,26 +180,11 @@ impl<'a> Detectors<'a> {
         }
     }
 
-    /// The histograms of the owned shots of `log`; `None` of detectors whose counts go into none.
-    pub fn histograms(&self, log: &ShotLog, light: &Light) -> Option<Histograms> {
+    /// The record of the owned shots of `log`, of a detector that makes one of each shot: histograms, taps or
+    /// beats. `None` of others.
+    pub fn record_by_shot(&self, log: &ShotLog, light: &Light) -> Option<Given> {
         match &self.work {
-            Work::Histograms(work) => Some(work.histograms(&self.chance, log, light)),
-            _ => None,
-        }
-    }
-
-    /// The taps of the owned shots of `log`; `None` of detectors that have none.
-    pub fn taps(&self, log: &ShotLog, light: &Light) -> Option<Taps> {
-        match &self.work {
-            Work::Taps(work) => Some(work.taps(&self.chance, log, light)),
-            _ => None,
-        }
-    }
-
-    /// The beats of the owned shots of `log`; `None` of detectors that have none.
-    pub fn beats(&self, log: &ShotLog, light: &Light) -> Option<Beats> {
-        match &self.work {
-            Work::Beats(work) => Some(work.beats(&self.chance, log, light)),
+            Work::ByShot(recorder) => Some(recorder.record(&self.chance, log, light)),
             _ => None,
         }
     }

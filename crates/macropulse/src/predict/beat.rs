@@ -10,12 +10,14 @@
 //! laser leaves less light in step, and lets beats wander.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
-use macropulse_codec::decode::BeatMethod;
+use macropulse_codec::decode::Method;
 use macropulse_codec::decode::beat::Ramp;
 use macropulse_codec::statistics::power_tail;
 
-use super::phase::Chances;
+use super::unmodelled::Unmodelled;
+use super::way::{Chances, ClosedForm, Incident, Way};
 use crate::design::detector::Coherent;
 use crate::design::{Design, Detector};
 use crate::units::{range_from_tof, tof_from_range};
@@ -30,9 +32,31 @@ const PLACES: u32 = 6;
 const FINE: f64 = 0.05;
 const PHOTONS: (f64, f64) = (-3.0, 9.0);
 
+/// Beats of light whose frequency is modulated. No mark has a threshold, and each detector sees its own mode alone.
+pub(super) static WAY: Way = Way {
+    not_modelled,
+    closed_form: |design| Some(Arc::new(Beats::of(design)?)),
+    limit_of_light: "it is out of step with that of the laser",
+    effects: &[
+        (Unmodelled::Saturation, None),
+        (Unmodelled::AirReturn, Some("its beats would lie over those of the first metres")),
+        (Unmodelled::Crosstalk, None),
+        (
+            Unmodelled::MirrorImages,
+            Some("an image has a beat of its own, and is found as a surface is"),
+        ),
+    ],
+};
+
+fn not_modelled(design: &Design) -> Option<(String, String)> {
+    let Detector::Coherent(Coherent { chirp, .. }) = &design.detector else { return None };
+    let what = "a frequency that strays from its ramps".to_owned();
+    (chirp.error.amplitude > 0.0).then(|| (what, "simulate it".to_owned()))
+}
+
 /// A sensor of frequency-modulated light, and its receiver.
 #[derive(Debug, Clone)]
-pub(super) struct Beats {
+struct Beats {
     coherent: Coherent,
     false_alarm: f64,
     /// For each number of photons in a ramp, e to the steps of [`FINE`]: the probability of a return, and the mean
@@ -51,8 +75,12 @@ struct Found {
 
 impl Beats {
     /// The forecast for a sensor of frequency-modulated light; `None` for others.
-    pub fn of(design: &Design, method: &BeatMethod) -> Option<Self> {
-        let Detector::Coherent(coherent) = &design.detector else { return None };
+    fn of(design: &Design) -> Option<Self> {
+        let (Detector::Coherent(coherent), Method::Beat(method)) =
+            (&design.detector, &design.receiver.method)
+        else {
+            return None;
+        };
         let threshold = method.threshold(design.receiver.gate_fs());
         let (least, ramps) = (method.least_power, method.ramps.len());
         let step = (threshold - ramps as f64 * least) / STEPS as f64;
@@ -95,15 +123,15 @@ impl Beats {
         let found = (0..=count).map(found).collect();
         Some(Self { coherent: coherent.clone(), false_alarm: method.false_alarm, found })
     }
+}
 
-    /// False returns of a shot that meets nothing.
-    pub fn false_alarm(&self) -> f64 {
+impl ClosedForm for Beats {
+    fn false_alarm(&self) -> f64 {
         self.false_alarm
     }
 
-    /// The chances of an echo at `range` metres with `photons` detected in a shot, while `background` photons of
-    /// sunlight are detected per second.
-    pub fn chances(&self, range: f64, photons: f64, background: f64) -> Chances {
+    fn chances(&self, incident: &Incident) -> Chances {
+        let &Incident { range, photons, background, .. } = incident;
         let Coherent { chirp, .. } = &self.coherent;
         let tof = tof_from_range(range);
         let shares = chirp.shares().into_iter().zip(chirp.ramps());

@@ -19,6 +19,7 @@ mod sampled;
 mod sidelobes;
 pub mod unmodelled;
 pub mod verdict;
+mod way;
 
 pub use forecast::{Error, Forecast, Forecaster};
 pub use own_light::{Blind, OwnLight, stray_room};

@@ -5,36 +5,51 @@
 //! tap is left out, so that each set of frequencies that may be left has a forecast of its own.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
-use macropulse_codec::decode::PhaseMethod;
+use macropulse_codec::decode::Method;
 use macropulse_codec::decode::phase::{rivals, threshold};
 use macropulse_codec::statistics::{normal_tail, power_tail};
 
+use super::unmodelled::Unmodelled;
+use super::way::{Chances, ClosedForm, Incident, Way};
 use crate::design::detector::LockIn;
-use crate::design::{Design, Detector};
+use crate::design::{Design, Detector, Wave};
 use crate::units::{range_from_tof, s_from_fs, tof_from_range};
+
+/// Phases of light whose power is modulated. Full taps are simulated, and no mark has a threshold.
+pub(super) static WAY: Way = Way {
+    not_modelled,
+    closed_form: |design| Some(Arc::new(Phases::of(design)?)),
+    limit_of_light: "the taps are full, or several intervals have the same phases",
+    effects: &[
+        (Unmodelled::Saturation, None),
+        (Unmodelled::AirReturn, Some("its phasor would add to that of every echo")),
+        (
+            Unmodelled::Crosstalk,
+            Some("light that is scattered in the lens would add to the phasors of all pixels"),
+        ),
+        (Unmodelled::MirrorImages, Some("the phasor of an image would add to that of the pane")),
+    ],
+};
+
+fn not_modelled(design: &Design) -> Option<(String, String)> {
+    let Method::Phase(settings) = &design.receiver.method else { return None };
+    let is_corrected = settings.tones.iter().all(|tone| tone.contrasts.len() > 1);
+    (design.emission.modulation()?.wave == Wave::Square && !is_corrected).then(|| {
+        let remedy = "simulate it, or leave out correct_harmonics";
+        ("harmonics that are not corrected".to_owned(), remedy.to_owned())
+    })
+}
 
 /// A sensor of modulated light, and its receiver.
 #[derive(Debug, Clone)]
-pub(super) struct Phases {
+struct Phases {
     lock_in: LockIn,
     false_alarm: f64,
     /// Power that is asked of the sum of phasors, by their number.
     thresholds: Vec<f64>,
     gate_fs: (i64, i64),
-}
-
-/// Expected findings.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Chances {
-    /// Probability of a return in the right interval.
-    pub pd: f64,
-    /// Amplitude over noise, √(2·power).
-    pub snr: f64,
-    /// Standard deviation of the range in the right interval, m.
-    pub precision: f64,
-    /// The least standard deviation that any estimate could have from these photons, m.
-    pub bound: f64,
 }
 
 /// A modulation frequency in this light.
@@ -57,8 +72,12 @@ struct Accepted {
 
 impl Phases {
     /// The forecast of a sensor of modulated light; `None` for others.
-    pub fn of(design: &Design, method: &PhaseMethod) -> Option<Self> {
-        let Detector::LockIn(lock_in) = &design.detector else { return None };
+    fn of(design: &Design) -> Option<Self> {
+        let (Detector::LockIn(lock_in), Method::Phase(method)) =
+            (&design.detector, &design.receiver.method)
+        else {
+            return None;
+        };
         let thresholds = (0..=lock_in.contrast.len())
             .map(|phasors| threshold(phasors, method.false_alarm))
             .collect();
@@ -69,15 +88,21 @@ impl Phases {
             gate_fs: design.receiver.gate_fs(),
         })
     }
+}
 
-    /// False returns of a shot that meets nothing.
-    pub fn false_alarm(&self) -> f64 {
+impl ClosedForm for Phases {
+    fn false_alarm(&self) -> f64 {
         self.false_alarm
     }
 
-    /// The findings at `range` metres for this number of detected photons of a shot, under `falling`
-    /// electrons a second that come evenly.
-    pub fn chances(&self, range: f64, photons: f64, falling: f64) -> Chances {
+    /// Taps are full of too much light.
+    fn can_be_blinded(&self) -> bool {
+        true
+    }
+
+    /// Only a return in the right interval counts.
+    fn chances(&self, incident: &Incident) -> Chances {
+        let &Incident { range, photons, falling, .. } = incident;
         let tof = tof_from_range(range);
         let seen: Vec<Seen> = self.each(tof, photons, falling).collect();
         let (mut pd, mut square) = (0.0, 0.0);
@@ -107,7 +132,9 @@ impl Phases {
         let bound = range_from_tof(self.information(photons).powf(-0.5));
         Chances { pd: pd.min(1.0), snr: (2.0 * power).sqrt(), precision, bound }
     }
+}
 
+impl Phases {
     /// The phasor of each frequency for this light.
     fn each(&self, tof: f64, photons: f64, falling: f64) -> impl Iterator<Item = Seen> + '_ {
         let LockIn { modulation, contrast, full_well, .. } = &self.lock_in;

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_4;
 use super::forecast::{Forecast, Forecaster};
 use super::link::spot_depth;
 use super::own_light::{Blind, stray_room};
+use super::way;
 use crate::design::Design;
 use crate::design::safety::strictest;
 use crate::units::{range_from_tof, s_from_fs};
@@ -116,16 +117,11 @@ fn light(night: &Forecaster, wanted: &Wanted) -> Check {
         None if night.design().receiver.method.sampling().is_some() => {
             "no amount of light would do: own light hides too many marks there".to_owned()
         }
-        None if night.design().readout.histogram().is_some() => {
-            "no amount of light would do: it comes after the last bin of the histogram".to_owned()
+        None => {
+            let limit = way::of(night.design())
+                .map_or("the receiver finds too many marks lit", |way| way.limit_of_light);
+            format!("no amount of light would do: {limit}")
         }
-        None if night.design().emission.modulation().is_some() => {
-            "no amount of light would do: the taps are full, or several intervals have the same phases".to_owned()
-        }
-        None if night.design().emission.chirp().is_some() => {
-            "no amount of light would do: it is out of step with that of the laser".to_owned()
-        }
-        None => "no amount of light would do: the receiver finds too many marks lit".to_owned(),
     };
     let light = match found.photons_per_shot.is_finite() {
         true => format!("{:.1} photons a shot", found.photons_per_shot),
@@ -204,16 +200,7 @@ fn sunlight(day: &Forecaster, wanted: &Wanted, forecast: &Forecast) -> Check {
 fn converters(design: &Design, forecast: &Forecast) -> Check {
     let loss = forecast.bank_loss;
     let finding = match design.bank() {
-        None if design.readout.histogram().is_some() => {
-            "every pixel has a histogram of its own, which is never busy".to_owned()
-        }
-        None if design.emission.modulation().is_some() => {
-            "every pixel has taps of its own, which are never busy".to_owned()
-        }
-        None if design.emission.chirp().is_some() => {
-            "every detector has spectra of its own, which are never busy".to_owned()
-        }
-        None => "every detector has an ADC of its own, which is never busy".to_owned(),
+        None => design.readout.model().unshared().to_owned(),
         Some(bank) => format!(
             "{:.2} % of detection events find all {} of a detector's bank busy",
             loss * 100.0,

@@ -46,12 +46,9 @@ pub(super) fn recorded(
 ) -> Recorded {
     let (design, detectors) = (setup.seen.design, setup.detectors);
     let mut tally = Tally::default();
-    let histograms = || detectors.histograms(log, light).map(Given::Histograms);
-    let taps = || detectors.taps(log, light).map(Given::Taps);
-    let beats = || detectors.beats(log, light).map(Given::Beats);
     let span = band.ticks(design).0;
     let samples = || detectors.samples(log, light, &span).map(Given::Samples);
-    if let Some(given) = histograms().or_else(taps).or_else(beats).or_else(samples) {
+    if let Some(given) = detectors.record_by_shot(log, light).or_else(samples) {
         tally.recorded = given.counted();
         if matches!(given, Given::Histograms(_)) {
             tally.detections = tally.recorded;

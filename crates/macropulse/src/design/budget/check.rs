@@ -119,9 +119,9 @@ impl Check<'_> {
         };
         let energy = self.energy(file.energy, allowed, off(Effect::EyeSafety))?;
         let aperture = self.within("optics.aperture_mm", optics.aperture_mm, 0.01, 1e4)? * 1e-3;
-        let (filter, field) = match parts.readout {
-            Readout::Spectrum(spectrum) => mode(wavelength, aperture, spectrum.sample_hz),
-            _ => (self.filter(optics)?, self.field(optics, parts.scan)?),
+        let (filter, field) = match parts.readout.model().bandwidth_of_mode() {
+            Some(bandwidth) => mode(wavelength, aperture, bandwidth),
+            None => (self.filter(optics)?, self.field(optics, parts.scan)?),
         };
         Ok(Some(Budget {
             wavelength,

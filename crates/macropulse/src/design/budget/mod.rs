@@ -105,8 +105,8 @@ impl Budget {
 
 /// Filter, m, and field of a coherent receiver: light within its bandwidth, in one mode of an aperture of
 /// this diameter. The mode has half of unpolarised light; the field is smaller by that factor.
-fn mode(wavelength: f64, aperture: f64, sample_hz: f64) -> (f64, Field) {
-    let filter = wavelength * wavelength * sample_hz / SPEED_OF_LIGHT;
+fn mode(wavelength: f64, aperture: f64, bandwidth: f64) -> (f64, Field) {
+    let filter = wavelength * wavelength * bandwidth / SPEED_OF_LIGHT;
     let solid_angle = wavelength * wavelength / (FRAC_PI_4 * aperture * aperture) / 2.0;
     (filter, Field { solid_angle, co_scanned: None })
 }

@@ -53,7 +53,7 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
     let mut found: Vec<Idle> = file.scan.idle().collect();
     let mut add = |holds: bool, keys: &[&str], by, why| {
         if holds {
-            found.extend(keys.iter().map(|key| Idle { key: (*key).to_owned(), by, why }));
+            found.extend(Idle::all(keys, by, why));
         }
     };
     let beam = ["light.divergence_mrad", "light.footprint_rays", "light.linewidth_ghz"];
@@ -89,35 +89,13 @@ fn idle(file: &SensorFile, idealised: &[Effect]) -> Vec<Idle> {
         "comparator",
         "events do not show it, only the samples of an [adc]",
     );
-    let is_counted = file.histogram.is_some();
-    add(is_counted, &["tdc"], "histogram", "counts go into bins, and no converter times them");
-    let is_measured = file.histogram.as_ref().is_some_and(|histogram| histogram.pulse.is_some());
-    let jitter = ["detector.geiger.jitter_ps"];
-    add(is_measured, &jitter, "histogram.pulse", "the pulse that was measured has it in it");
-    if let Some(modulation) = &file.modulation {
-        let no_pulse = ["tdc", "light.pulse_ps"];
-        add(
-            true,
-            &no_pulse,
-            "modulation",
-            "modulated light has no pulses, and no event of it is timed",
-        );
-        let wiggle = ["receiver.correct_harmonics"];
-        add(modulation.is_sine(), &wiggle, "modulation.wave", "a sine has no harmonics");
-    }
-    if let Some(chirp) = &file.chirp {
-        let no_pulse = ["tdc", "light.pulse_ps", "light.linewidth_ghz"];
-        let why = "light with a chirp has no pulses, and its line is that of chirp.linewidth_khz";
-        add(true, &no_pulse, "chirp", why);
-        let of_mode = ["optics.filter_nm", "optics.field"];
-        add(true, &of_mode, "chirp", "light of the mode of the laser alone makes a beat");
-        let speed = ["receiver.max_speed_m_s"];
-        add(chirp.is_single(), &speed, "chirp.down_us", "a single ramp measures no speed");
-    }
-    add(file.chirp.is_none(), &["spectrum"], "chirp", "there are no beats without a [chirp]");
+    found.extend(file.optional().flat_map(|table| table.idle(file)));
     let unlabelled = file.code.as_ref().is_some_and(|code| code.label == Label::None);
     let payload = ["code.label_bits", "code.crc", "code.sync_bit", "code.allow_dark"];
-    add(unlabelled, &payload, "code.label", "a macropulse without a label is a bare code word");
+    if unlabelled {
+        let why = "a macropulse without a label is a bare code word";
+        found.extend(Idle::all(&payload, "code.label", why));
+    }
     found
 }
 

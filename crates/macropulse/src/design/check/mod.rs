@@ -3,24 +3,30 @@
 mod effectless;
 mod emitted;
 mod misplaced;
+mod optional;
 
 use std::sync::OnceLock;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+pub(in crate::design) use optional::{Continuous, OptionalTable};
+
 use super::budget::{self, BudgetFile, OpticsFile, SafetyFile};
+use super::burst::BurstFile;
 use super::chirp::ChirpFile;
 use super::coding::CodeFile;
 use super::detector::{Before, ComparatorFile, DetectorFile, Efficiency};
 use super::document::Chain;
-use super::emission::BurstFile;
+use super::emission::Occupancy;
+use super::histogram::HistogramFile;
 use super::light::LightFile;
 use super::limits::Check;
 use super::modulation::ModulationFile;
-use super::readout::{AdcFile, HistogramFile, SpectrumFile, TdcFile};
+use super::readout::{AdcFile, TdcFile};
 use super::receiver::{Inputs, ReceiverFile};
 use super::scan::ScanFile;
+use super::spectrum::SpectrumFile;
 use super::{Clock, Design, Detector, Effect, Emission, Error, Light, Scan};
 use crate::names::nearest;
 use crate::schema;
@@ -81,7 +87,7 @@ impl SensorFile {
 
     /// Returns true if its light comes in pulses.
     fn is_pulsed(&self) -> bool {
-        self.modulation.is_none() && self.chirp.is_none()
+        self.continuous().next().is_none()
     }
 
     /// The ADC, where there is a signal for it.
@@ -131,14 +137,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     // A list that cannot be read says nothing about the motion of the beam.
     let moves = effects.is_some() && !off(Effect::MirrorMotion);
     let scan = faults.keep(check.scan(&file.scan, moves));
-    let adc = file.adc();
-    let timing = faults.keep(match (&file.histogram, adc) {
-        _ if file.modulation.is_some() => Ok(check.of_taps()),
-        _ if file.chirp.is_some() => check.chirped_readout(file),
-        (Some(histogram), _) => check.histogram(histogram),
-        (None, Some(adc)) => check.adc(adc),
-        (None, None) => check.tdc(&file.tdc),
-    });
+    let timing = faults.keep(check.readout(file));
     let emission = match (&scan, &timing) {
         (Some(scan), Some((clock, readout))) => {
             faults.keep(check.share(readout, scan));
@@ -185,7 +184,7 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
         readout: &readout,
         budget: budget.as_ref().and_then(Option::as_ref),
         comparator: file.comparator.as_ref(),
-        adc,
+        adc: file.adc(),
     };
     let detector =
         budget.as_ref().and_then(|_| faults.keep(check.detector(&file.detector, &before)));
@@ -193,29 +192,14 @@ fn of_sections(check: &Check, typed: SensorFile, faults: &mut Faults) -> Option<
     let spread = detector.as_ref().and_then(|detector| detector.spread_of(&light));
     let jitter = detector.as_ref().map_or(0.0, |detector| detector.model().jitter());
     let inputs = Inputs {
-        detector: &file.detector,
+        detector_file: &file.detector,
+        detector: detector.as_ref(),
         scan: &scan,
         clock,
         readout: &readout,
         emission: &emission,
         timing: libm::hypot(jitter, spread.unwrap_or(0.0)),
         photons_apart: spread.is_some(),
-        sampled: detector.as_ref().and_then(|detector| match detector {
-            Detector::Sampled(sampled) => Some(sampled),
-            _ => None,
-        }),
-        counting: detector.as_ref().and_then(|detector| match detector {
-            Detector::Geiger(geiger) => Some(geiger),
-            _ => None,
-        }),
-        lock_in: detector.as_ref().and_then(|detector| match detector {
-            Detector::LockIn(lock_in) => Some(lock_in),
-            _ => None,
-        }),
-        coherent: detector.as_ref().and_then(|detector| match detector {
-            Detector::Coherent(coherent) => Some(coherent),
-            _ => None,
-        }),
         pulse: libm::hypot(jitter, light.pulse * RMS_OF_FWHM),
     };
     let receiver = faults.keep(check.receiver(&file.receiver, &inputs)).flatten();
@@ -351,27 +335,13 @@ impl Check<'_> {
     /// A macropulse must end before the next one that the same detector sees begins.
     fn timing(&self, design: &mut Design) -> Result<(), Error> {
         let derived = design.derived();
-        if let Some(burst) = design.emission.burst() {
-            let lasts = s_from_fs(i64::from(burst.pulses) * burst.interval_fs);
-            if lasts > derived.channel_period {
-                let message = format!(
-                    "lasts {:.3} µs with the interval behind its last pulse, longer than the {:.3} µs between \
-                     two shots of a detector: fewer pulses, a shorter interval, or a slower scan",
-                    lasts * 1e6,
-                    derived.channel_period * 1e6
-                );
-                return self.refuse("burst", message);
-            }
-        }
-        let (table, remedy) = match design.emission {
-            Emission::Modulated(_) => ("modulation", "fewer taps, shorter exposures"),
-            _ => ("chirp", "shorter ramps, a shorter light_range_m"),
-        };
-        let lasts = s_from_fs(design.emission.length_fs());
-        if !design.emission.is_pulsed() && lasts > derived.channel_period {
+        if let Some(Occupancy { fs, table, with, remedy }) = design.emission.model().occupancy()
+            && s_from_fs(fs) > derived.channel_period
+        {
             let message = format!(
-                "lasts {:.3} µs, longer than the {:.3} µs between two shots of a detector: {remedy}, or a slower scan",
-                lasts * 1e6,
+                "lasts {:.3} µs{with}, longer than the {:.3} µs between two shots of a detector: {remedy}, or a \
+                 slower scan",
+                s_from_fs(fs) * 1e6,
                 derived.channel_period * 1e6
             );
             return self.refuse(table, message);
@@ -400,9 +370,9 @@ impl Check<'_> {
         if let Some(range) = derived.unambiguous_range
             && range < design.scan.max_range
         {
-            let repeats = match design.emission.modulation() {
-                Some(_) => "the phases of all modulation frequencies repeat",
-                None => "a code word returns",
+            let repeats = match design.is_coded() {
+                true => "a code word returns",
+                false => design.emission.model().ambiguity(),
             };
             design.warnings.push(format!(
                 "{repeats} after {range:.1} m, within the range gate of {:.1} m",

@@ -3,15 +3,20 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use macropulse_codec::decode::BeatMethod;
+use macropulse_codec::decode::{BeatMethod, Method};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Detector, Lit, Model, Sensitivity, Table, Typed};
+use crate::design::limits::Check;
+use crate::design::receiver::{Inputs, ReceiverFile};
 use crate::design::{Chirp, Emission, Error, Light, Readout, Spectrum};
 
 /// A return that is only just found has this power in each ramp, in units of that of noise.
 const JUST_FOUND: f64 = 13.8;
+
+/// Radial velocity at most, m/s, if a file does not say: of two cars at 108 km/h that meet.
+const MAX_SPEED: f64 = 60.0;
 
 /// `[detector.coherent]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -76,6 +81,24 @@ impl Typed for File {
             quadratures: self.quadratures.unwrap_or(false),
             wavelength: table.before.light.wavelength,
         }))
+    }
+}
+
+impl Check<'_> {
+    /// How a receiver decodes beats; `None` without the detector that it has to know.
+    pub(in crate::design) fn of_beats(
+        &self,
+        file: &ReceiverFile,
+        inputs: &Inputs,
+        false_alarm: f64,
+    ) -> Result<Option<Method>, Error> {
+        let Some(Detector::Coherent(coherent)) = inputs.detector else { return Ok(None) };
+        let fastest = file.max_speed_m_s.unwrap_or(MAX_SPEED);
+        let fastest = self.within("receiver.max_speed_m_s", fastest, 0.0, 1e4)?;
+        let share = file.least_share.unwrap_or(0.0);
+        let share = self.within("receiver.least_share", share, 0.0, 1.0)?;
+        self.bins(coherent, inputs.scan.max_range, fastest)?;
+        Ok(Some(Method::Beat(coherent.method(share, fastest, false_alarm))))
     }
 }
 
@@ -160,6 +183,10 @@ impl Model for Coherent {
             if self.quadratures { " in both quadratures" } else { "" },
             self.sensitivity.summary_of("shot")
         )
+    }
+
+    fn follows_speckle(&self) -> bool {
+        true
     }
 
     fn in_sunlight(&self) -> &'static str {

@@ -3,12 +3,14 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use macropulse_codec::decode::PhaseMethod;
 use macropulse_codec::decode::phase::Tone;
+use macropulse_codec::decode::{Method, PhaseMethod};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Detector, Lit, Model, Sensitivity, Table, Typed};
+use crate::design::limits::Check;
+use crate::design::receiver::{Inputs, ReceiverFile};
 use crate::design::{Emission, Error, Light, Modulation};
 
 /// Share of the codes that are below that of a tap which has collected nothing, so that noise is not cut off.
@@ -104,6 +106,20 @@ impl Typed for File {
             dark_code: (f64::from(full_scale) * BELOW).round(),
             full_scale: full_scale as u16,
         }))
+    }
+}
+
+impl Check<'_> {
+    /// How a receiver decodes taps; `None` without the detector that it has to know.
+    pub(in crate::design) fn of_taps(
+        &self,
+        file: &ReceiverFile,
+        inputs: &Inputs,
+        false_alarm: f64,
+    ) -> Result<Option<Method>, Error> {
+        let Some(Detector::LockIn(lock_in)) = inputs.detector else { return Ok(None) };
+        let corrects = file.correct_harmonics.unwrap_or(true);
+        Ok(Some(Method::Phase(lock_in.method(corrects, false_alarm))))
     }
 }
 

@@ -277,6 +277,11 @@ pub trait Model {
         FirstEvent::without_memory(awaited)
     }
 
+    /// True if it draws the speckle of each echo itself.
+    fn follows_speckle(&self) -> bool {
+        false
+    }
+
     /// Description in half a line, for people.
     fn summary(&self) -> String;
 

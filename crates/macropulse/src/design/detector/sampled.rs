@@ -5,11 +5,13 @@
 
 use std::f64::consts::TAU;
 
-use macropulse_codec::decode::{Coupling, STEPS_OF_TICK, Sampling};
+use macropulse_codec::decode::{self, Correlation, Coupling, Method, STEPS_OF_TICK, Sampling};
 use macropulse_codec::statistics::normal_tail;
 
-use super::{FrontEnd, Lit, Model, Noise, Sensitivity};
-use crate::design::Light;
+use super::{Detector, FrontEnd, Lit, Model, Noise, Sensitivity};
+use crate::design::limits::Check;
+use crate::design::receiver::{Inputs, ReceiverFile};
+use crate::design::{Error, Light};
 use crate::units::{FS_PER_S, fs_from_s};
 
 /// A mark that stands alone is called found if it is this number of deviations of the noise high.
@@ -31,6 +33,9 @@ const SHOWS: f64 = 4.0;
 
 /// The receiver knows a pulse to this number of its rms lengths: there it is 4·10⁻⁶ of its height.
 pub(super) const REACH: f64 = 5.0;
+
+/// Marks by which a receiver decides at least if its file does not say: one alone may be that of any shot.
+const LEAST_MARKS: u32 = 2;
 
 /// A photodiode with an amplifier and an analogue-to-digital converter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,6 +64,36 @@ pub struct Sampled {
 /// Time constants after which all of a range of this number of `codes` is forgotten.
 pub(super) fn remembered(codes: f64) -> f64 {
     libm::log(codes / FORGOTTEN)
+}
+
+impl Check<'_> {
+    /// How a receiver decodes samples; `None` without the detector that it has to know. Its lengths and its
+    /// rate of false alarms are those of a `correlation`.
+    pub(in crate::design) fn of_samples(
+        &self,
+        file: &ReceiverFile,
+        inputs: &Inputs,
+        correlation: &Correlation,
+    ) -> Result<Option<Method>, Error> {
+        let Some(Detector::Sampled(sampled)) = inputs.detector else { return Ok(None) };
+        let lightest = inputs.emission.coding().codebook.lightest_word() as u32;
+        let least = match file.least_marks {
+            Some(typed) => self.count("receiver.least_marks", typed, 1, lightest)?,
+            None => LEAST_MARKS.min(lightest),
+        };
+        let ns =
+            |key, value| -> Result<f64, Error> { Ok(self.within(key, value, 0.0, 1e6)? * 1e-9) };
+        let blank = ns("receiver.blank_ns", file.blank_ns)?;
+        let recovery = ns("receiver.recovery_ns", file.recovery_ns)?;
+        let &Correlation { ticks_per_chip, light_ticks, false_alarm, .. } = correlation;
+        let sampling = sampled.sampling((blank, recovery), least as u16);
+        Ok(Some(Method::Sampled(decode::Sampled {
+            ticks_per_chip,
+            light_ticks,
+            false_alarm,
+            sampling,
+        })))
+    }
 }
 
 impl Sampled {

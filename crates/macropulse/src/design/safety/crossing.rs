@@ -53,7 +53,7 @@ pub(in crate::design) fn exposure(class: &Class1, sender: &Sender) -> Exposure {
         brightest_shot: passed * energies.most(),
         brightest_mark: passed / emission.mean_parts(),
         count_groups: sender.count_groups,
-        counted_as_one: emission.share_within(class.counted_as_one()),
+        counted_as_one: emission.model().share_within(class.counted_as_one()),
         places: Vec::new(),
     };
     let beams = scan.model().beams();

@@ -19,11 +19,11 @@ mod tests;
 use std::ops::Range;
 
 use macropulse_codec::decode::beat::Ramp;
-use macropulse_codec::{Beats, Peak, ShotLog};
+use macropulse_codec::{Beats, Given, Peak, ShotLog};
 use rand_distr::{Distribution, StandardNormal};
 use rustfft::num_complex::Complex64;
 
-use super::own_by_shot;
+use super::{ShotRecorder, own_by_shot};
 use crate::channel::Light;
 use crate::design::detector::Coherent;
 use crate::design::{Design, Fidelity};
@@ -86,6 +86,12 @@ struct Path {
     field: Complex64,
 }
 
+impl ShotRecorder for Mixer {
+    fn record(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Given {
+        Given::Beats(self.beats(chance, log, light))
+    }
+}
+
 impl Mixer {
     /// The mixer of `design`. `background` is the photons of sunlight detected per second in the mode of its laser.
     pub fn new(coherent: &Coherent, design: &Design, background: f64) -> Self {
@@ -107,8 +113,7 @@ impl Mixer {
         Self { coherent: coherent.clone(), efficiency, noise, least_power, ramps, way }
     }
 
-    /// The beats of the owned shots of `log`, in their order.
-    pub fn beats(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Beats {
+    fn beats(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Beats {
         let peaks = self.coherent.spectrum.peaks;
         let mut beats = Beats { ramps: self.ramps.len() as u32, peaks, found: Vec::new() };
         beats.found.reserve(log.owned.len() * self.ramps.len() * peaks as usize);

@@ -17,6 +17,7 @@ use super::peaks::{Bins, NEAR};
 use super::{RampBins, Tone, normal, turned};
 use crate::design::Chirp;
 use crate::design::detector::Coherent;
+use crate::design::emission::Model;
 use crate::random::{Chance, Stage, Stream};
 use crate::units::s_from_fs;
 

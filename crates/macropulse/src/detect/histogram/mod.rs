@@ -13,9 +13,10 @@ mod draw;
 
 use macropulse_codec::decode::histogram::{Kernel, STEPS};
 use macropulse_codec::statistics::normal_tail;
-use macropulse_codec::{Histograms, ShotLog};
+use macropulse_codec::{Given, Histograms, ShotLog};
 
 use self::draw::Cells;
+use super::ShotRecorder;
 use crate::channel::Light;
 use crate::design::detector::{Geiger, PLENTY};
 use crate::design::{Burst, Design, Histogram};
@@ -60,6 +61,12 @@ enum Shape<'a> {
     Measured(&'a Kernel),
 }
 
+impl ShotRecorder for Accumulator {
+    fn record(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Given {
+        Given::Histograms(self.histograms(chance, log, light))
+    }
+}
+
 impl Accumulator {
     pub fn new(geiger: &Geiger, (burst, histogram): (&Burst, &Histogram), design: &Design) -> Self {
         let bin_fs = design.clock.tick_fs;
@@ -70,8 +77,7 @@ impl Accumulator {
         Self { geiger: *geiger, cells, burst: burst.clone(), bins, measured, bin_fs, efficiency }
     }
 
-    /// The histograms of the owned shots of `log`, in their order.
-    pub fn histograms(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Histograms {
+    fn histograms(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Histograms {
         let mut counts = Vec::with_capacity(log.owned.len() * self.bins as usize);
         let order = by_channel(light);
         let steady = self.geiger.dark + light.background.steady * self.efficiency;

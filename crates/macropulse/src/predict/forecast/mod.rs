@@ -15,7 +15,8 @@ use super::best_lag::{BestLag, Sight};
 use super::converters::bank_loss;
 use super::own_light::{OwnLight, stray_room};
 use super::sidelobes::{Aside, Sidelobes};
-use super::{balanced, beat, belief, histogram, matched, phase, sampled};
+use super::way::{self, ClosedForm, Incident};
+use super::{balanced, belief, matched, sampled};
 use crate::channel::{self, Operating, Speckle};
 use crate::design::detector::{Awaited, Lit, Model, PLENTY, Sampled};
 use crate::design::{Design, Detector};
@@ -56,12 +57,8 @@ pub struct Forecaster<'a> {
     sidelobes: Option<Sidelobes>,
     /// The points of the sums over noise, of a receiver of samples; empty of the others.
     points: Arc<[sampled::Points]>,
-    /// For a receiver of histograms.
-    counting: Option<histogram::Counting>,
-    /// For a receiver of taps.
-    phases: Option<phase::Phases>,
-    /// For a receiver of beats.
-    beats: Option<Arc<beat::Beats>>,
+    /// For a way to measure that has one of its own.
+    closed_form: Option<Arc<dyn ClosedForm>>,
     /// Factor on the light of the sensor.
     light: f64,
     /// Factor on the dark and background counts.
@@ -141,18 +138,6 @@ impl<'a> Forecaster<'a> {
         let neighbours = if is_matched { belief::neighbours(design) } else { 0.0 };
         let sampling = design.receiver.method.sampling();
         let points = sampling.map_or_else(Vec::new, |known| sampled::Points::of(design, known));
-        let counting = match &design.receiver.method {
-            Method::Histogram(method) => histogram::Counting::of(design, method),
-            _ => None,
-        };
-        let phases = match &design.receiver.method {
-            Method::Phase(method) => phase::Phases::of(design, method),
-            _ => None,
-        };
-        let beats = match &design.receiver.method {
-            Method::Beat(method) => beat::Beats::of(design, method).map(Arc::new),
-            _ => None,
-        };
         Ok(Self {
             design,
             operating,
@@ -162,9 +147,7 @@ impl<'a> Forecaster<'a> {
             neighbours,
             sidelobes,
             points: points.into(),
-            counting,
-            phases,
-            beats,
+            closed_form: way::of(design).and_then(|way| (way.closed_form)(design)),
             light,
             background,
         })
@@ -261,29 +244,10 @@ impl<'a> Forecaster<'a> {
         if let Some(sampled) = self.sampled() {
             return self.of_samples(sampled, reflectance, range, told);
         }
-        if let Some(counting) = &self.counting {
-            return self.of_histograms(counting, reflectance, range);
+        if let Some(form) = &self.closed_form {
+            return self.of_form(form.as_ref(), reflectance, range);
         }
         let detected = self.light * operating.link.detected(reflectance, range);
-        if let Some(phases) = &self.phases {
-            let falling = self.background * operating.false_rate;
-            let chances = phases.chances(range, detected, falling);
-            return self.without_pulses(
-                (reflectance, range),
-                detected,
-                phases.false_alarm(),
-                &chances,
-            );
-        }
-        if let Some(beats) = &self.beats {
-            let chances = beats.chances(range, detected, self.background * operating.background);
-            return self.without_pulses(
-                (reflectance, range),
-                detected,
-                beats.false_alarm(),
-                &chances,
-            );
-        }
         let detector = design.detector.model();
         let (channel_period, mean_weight) = (self.channel_period, self.mean_weight);
         let false_rate = self.background * operating.false_rate;
@@ -426,59 +390,27 @@ impl<'a> Forecaster<'a> {
         }
     }
 
-    /// The forecast of a receiver of histograms for a target of `reflectance` at `range` metres. A target
-    /// whose light comes after the last bin is never found. `background` counts for sunlight and dark counts.
-    fn of_histograms(
-        &self,
-        counting: &histogram::Counting,
-        reflectance: f64,
-        range: f64,
-    ) -> Forecast {
-        let design = self.design;
-        let detected = self.light * self.operating.link.detected(reflectance, range);
-        let falling = self.background * self.operating.false_rate;
-        let chances = counting.chances(range, detected, falling);
-        let efficiency = design.efficiency();
-        let pulses = design.emission.mean_pulses();
-        let photons = (detected * pulses).max(f64::MIN_POSITIVE);
-        let rms = libm::hypot(design.light.pulse * RMS_OF_FWHM, design.detector.model().jitter());
+    /// The forecast of a sensor with a closed `form` for a target of `reflectance` at `range` metres.
+    fn of_form(&self, form: &dyn ClosedForm, reflectance: f64, range: f64) -> Forecast {
+        let (design, operating) = (self.design, &self.operating);
+        let detected = self.light * operating.link.detected(reflectance, range);
+        let chances = form.chances(&Incident {
+            range,
+            photons: detected,
+            background: self.background * operating.background,
+            falling: self.background * operating.false_rate,
+        });
         Forecast {
             range,
             reflectance,
-            photons_per_shot: detected * pulses / efficiency,
-            detected_per_mark: detected,
-            mark_pd: -libm::expm1(-detected),
-            bank_loss: 0.0,
-            density: 0.0,
-            snr: chances.level,
-            pd: chances.pd,
-            false_per_shot: counting.false_alarm(),
-            precision: (chances.pd * FEWEST >= 1.0).then_some(chances.precision),
-            aside: None,
-            bound: range_from_tof(rms) / photons.sqrt(),
-        }
-    }
-
-    /// The forecast of a sensor without pulses for a target of this reflectance and range, m: `detected`
-    /// photons of a shot and the resulting `chances`.
-    fn without_pulses(
-        &self,
-        (reflectance, range): (f64, f64),
-        detected: f64,
-        false_per_shot: f64,
-        chances: &phase::Chances,
-    ) -> Forecast {
-        Forecast {
-            range,
-            reflectance,
-            photons_per_shot: detected / self.design.efficiency(),
+            photons_per_shot: detected * design.emission.mean_pulses() / design.efficiency(),
             detected_per_mark: detected,
             mark_pd: -libm::expm1(-detected),
             bank_loss: 0.0,
             density: 0.0,
             snr: chances.snr,
             pd: chances.pd,
-            false_per_shot,
+            false_per_shot: form.false_alarm(),
             precision: (chances.pd * FEWEST >= 1.0).then_some(chances.precision),
             aside: None,
             bound: chances.bound,

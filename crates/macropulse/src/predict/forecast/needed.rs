@@ -12,7 +12,7 @@ impl Forecaster<'_> {
     pub fn light_needed(&self, pd: f64, reflectance: f64, range: f64) -> Option<f64> {
         let enough = |factor: f64| self.with_light(factor).forecast(reflectance, range).pd >= pd;
         // Cells that count once a pulse are blinded by far too much of it, and taps are full.
-        let most = match self.counting.is_some() || self.phases.is_some() {
+        let most = match self.closed_form.as_ref().is_some_and(|form| form.can_be_blinded()) {
             false => 1e9,
             true => (-9..=9).map(|power| 10_f64.powi(power)).find(|factor| enough(*factor))?,
         };

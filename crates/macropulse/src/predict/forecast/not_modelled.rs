@@ -3,10 +3,10 @@
 use macropulse_codec::RecordKind;
 use macropulse_codec::decode::Method;
 
-use super::super::{histogram, sampled};
+use super::super::{sampled, way};
 use crate::channel::Operating;
 use crate::design::detector::Sampled;
-use crate::design::{Design, Detector, Wave};
+use crate::design::{Design, Detector};
 use crate::units::s_from_fs;
 
 /// Amplitude over the threshold at which the marks of a word must be told apart for there to be a forecast.
@@ -20,27 +20,8 @@ const SEEN_BELOW: f64 = 4.0;
 /// answer all the same.
 pub(super) fn reason(design: &Design, operating: &Operating) -> Option<(String, String)> {
     let method = &design.receiver.method;
-    if let (Method::Histogram(_), Detector::Geiger(geiger)) = (method, &design.detector) {
-        let interval_fs = design.emission.burst().map_or(i64::MAX, |burst| burst.interval_fs);
-        let what = if geiger.crosstalk > 0.0 {
-            "optical crosstalk between cells"
-        } else if geiger.dead_fs / interval_fs >= histogram::MOST_CYCLES {
-            "a dead time of many cycles"
-        } else {
-            return None;
-        };
-        return Some((what.to_owned(), "simulate it".to_owned()));
-    }
-    if let (Method::Phase(settings), Some(modulation)) = (method, design.emission.modulation()) {
-        let is_corrected = settings.tones.iter().all(|tone| tone.contrasts.len() > 1);
-        return (modulation.wave == Wave::Square && !is_corrected).then(|| {
-            let remedy = "simulate it, or leave out correct_harmonics";
-            ("harmonics that are not corrected".to_owned(), remedy.to_owned())
-        });
-    }
-    if let (Method::Beat(_), Some(chirp)) = (method, design.emission.chirp()) {
-        let what = "a frequency that strays from its ramps".to_owned();
-        return (chirp.error.amplitude > 0.0).then(|| (what, "simulate it".to_owned()));
+    if let Some(way) = way::of(design) {
+        return (way.not_modelled)(design);
     }
     if !matches!(method, Method::Direct | Method::Sampled(_)) && method.correlation().is_none() {
         let what = format!("the receiver `{}`", method.kind().name());

@@ -7,14 +7,18 @@
 
 mod cells;
 
-use macropulse_codec::decode::HistogramMethod;
+use std::sync::Arc;
+
+use macropulse_codec::decode::Method;
 use macropulse_codec::decode::histogram::{Decision, Exposed, PileUp, Stretch};
 use rand_distr::{Binomial, Distribution, Poisson};
 
+use super::unmodelled::Unmodelled;
+use super::way::{Chances, ClosedForm, Incident, Way};
 use crate::design::detector::{Geiger, PLENTY};
 use crate::design::{Design, Detector};
 use crate::random::{Chance, Stage, Stream};
-use crate::units::{fs_from_s, range_from_tof, s_from_fs, tof_from_range};
+use crate::units::{RMS_OF_FWHM, fs_from_s, range_from_tof, s_from_fs, tof_from_range};
 
 /// Histograms that are drawn: a probability is known to 0.006, one standard deviation, and better where photons are
 /// many.
@@ -27,11 +31,31 @@ const CERTAIN: f64 = 24.0;
 const PHASES: i64 = 8;
 
 /// Dead times of this number of cycles or more are refused: the cells take long to settle.
-pub(super) const MOST_CYCLES: i64 = 16;
+const MOST_CYCLES: i64 = 16;
+
+/// Counts of bursts, in histograms, which follow afterpulses.
+pub(super) static WAY: Way = Way {
+    not_modelled,
+    closed_form: |design| Some(Arc::new(Counting::of(design)?)),
+    limit_of_light: "it comes after the last bin of the histogram",
+    effects: &[(Unmodelled::Afterpulsing, None)],
+};
+
+fn not_modelled(design: &Design) -> Option<(String, String)> {
+    let Detector::Geiger(geiger) = &design.detector else { return None };
+    let what = if geiger.crosstalk > 0.0 {
+        "optical crosstalk between cells"
+    } else if geiger.dead_fs / design.emission.burst()?.interval_fs >= MOST_CYCLES {
+        "a dead time of many cycles"
+    } else {
+        return None;
+    };
+    Some((what.to_owned(), "simulate it".to_owned()))
+}
 
 /// A sensor that counts in histograms, and its receiver.
 #[derive(Debug, Clone)]
-pub(super) struct Counting {
+struct Counting {
     geiger: Geiger,
     decision: Decision,
     pile_up: PileUp,
@@ -41,17 +65,8 @@ pub(super) struct Counting {
     bins: usize,
     of_cycle: usize,
     pulses: f64,
-}
-
-/// Expected findings.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Chances {
-    /// Probability of a return.
-    pub pd: f64,
-    /// √(2Λ) of the mean counts, Λ the logarithm of the likelihood ratio.
-    pub level: f64,
-    /// Standard deviation of the range, m.
-    pub precision: f64,
+    /// rms length of a pulse with the jitter, s.
+    rms: f64,
 }
 
 /// Mean counts in the bins that are recorded.
@@ -67,12 +82,13 @@ struct Means {
 
 impl Counting {
     /// The counting of a sensor with histograms; `None` for others.
-    pub fn of(design: &Design, method: &HistogramMethod) -> Option<Self> {
-        let (Detector::Geiger(geiger), Some(burst), Some(histogram)) =
-            (&design.detector, design.emission.burst(), design.readout.histogram())
+    fn of(design: &Design) -> Option<Self> {
+        let (Detector::Geiger(geiger), Method::Histogram(method)) =
+            (&design.detector, &design.receiver.method)
         else {
             return None;
         };
+        let (burst, histogram) = (design.emission.burst()?, design.readout.histogram()?);
         let bin_fs = design.clock.tick_fs;
         let gate_fs = design.receiver.gate_fs();
         Some(Self {
@@ -84,19 +100,30 @@ impl Counting {
             bins: histogram.bins as usize,
             of_cycle: (burst.interval_fs / bin_fs) as usize,
             pulses: f64::from(burst.pulses),
+            rms: libm::hypot(design.light.pulse * RMS_OF_FWHM, design.detector.model().jitter()),
         })
     }
+}
 
-    /// False returns of a histogram at most.
-    pub fn false_alarm(&self) -> f64 {
+impl ClosedForm for Counting {
+    fn false_alarm(&self) -> f64 {
         self.false_alarm
     }
 
-    /// Findings at `range` metres for pulses of this number of `photons` each, under `falling` detections a
-    /// second that come evenly.
-    pub fn chances(&self, range: f64, photons: f64, falling: f64) -> Chances {
+    /// Cells that count once a pulse miss an echo behind too much light.
+    fn can_be_blinded(&self) -> bool {
+        true
+    }
+
+    /// A target whose light comes after the last bin is never found.
+    fn chances(&self, incident: &Incident) -> Chances {
+        let &Incident { range, photons, falling, .. } = incident;
         let tof_fs = fs_from_s(tof_from_range(range));
-        let Some(stretch) = self.decision.stretch(tof_fs) else { return Chances::default() };
+        let of_shot = (photons * self.pulses).max(f64::MIN_POSITIVE);
+        let bound = range_from_tof(self.rms) / of_shot.sqrt();
+        let Some(stretch) = self.decision.stretch(tof_fs) else {
+            return Chances { bound, ..Chances::default() };
+        };
         let photons = photons.min(PLENTY);
         let means = self.means(&self.decision.shares(tof_fs), photons, falling);
         let at = stretch.first..stretch.first + stretch.shares.len();
@@ -126,9 +153,12 @@ impl Counting {
             found.count() as f64 / DRAWN as f64
         });
         let precision = self.precision(&means, &stretch, tof_fs, (photons, falling));
-        Chances { pd: drawn.unwrap_or(1.0), level, precision }
+        // √(2Λ) of the mean counts, Λ the logarithm of the likelihood ratio.
+        Chances { pd: drawn.unwrap_or(1.0), snr: level, precision, bound }
     }
+}
 
+impl Counting {
     /// Mean counts for a pulse with these `shares` of its `photons`.
     fn means(&self, shares: &[f64], photons: f64, falling: f64) -> Means {
         let steady = falling * s_from_fs(self.bin_fs);

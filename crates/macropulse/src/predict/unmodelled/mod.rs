@@ -6,6 +6,7 @@
 
 mod size;
 
+use super::way;
 use crate::channel::Error;
 use crate::design::{Design, Detector, Effect};
 use crate::environment::{Effect as Surrounding, Environment};
@@ -97,27 +98,24 @@ impl Unmodelled {
     /// Its size on `design` in `environment`; `None` where there it cannot occur, does not follow
     /// from what the sensor file says, or falls under an effect that is idealised.
     fn size(self, design: &Design, environment: &Environment, seen: &Sized) -> Option<String> {
+        let effects = way::of(design).map_or(&[][..], |way| way.effects);
+        let of_way = effects.iter().find(|(effect, _)| *effect == self);
+        match (self, of_way) {
+            (Self::AirReturn, Some(_)) if environment.is_off(Surrounding::Atmosphere) => None,
+            (_, Some((_, size))) => size.map(str::to_owned),
+            (_, None) => self.size_of_marks(design, environment, seen),
+        }
+    }
+
+    /// The same of light with marks.
+    fn size_of_marks(
+        self,
+        design: &Design,
+        environment: &Environment,
+        seen: &Sized,
+    ) -> Option<String> {
         let budget = design.budget.as_ref();
-        let is_modulated = design.emission.modulation().is_some();
-        let is_chirped = design.emission.chirp().is_some();
         match self {
-            // Full taps are simulated, and no mark has a threshold.
-            Self::Saturation if is_modulated || is_chirped => None,
-            Self::AirReturn if is_modulated => (!environment.is_off(Surrounding::Atmosphere))
-                .then(|| "its phasor would add to that of every echo".to_owned()),
-            Self::AirReturn if is_chirped => (!environment.is_off(Surrounding::Atmosphere))
-                .then(|| "its beats would lie over those of the first metres".to_owned()),
-            Self::Crosstalk if is_chirped => None,
-            Self::MirrorImages if is_chirped => {
-                Some("an image has a beat of its own, and is found as a surface is".to_owned())
-            }
-            Self::Crosstalk if is_modulated => Some(
-                "light that is scattered in the lens would add to the phasors of all pixels"
-                    .to_owned(),
-            ),
-            Self::MirrorImages if is_modulated => {
-                Some("the phasor of an image would add to that of the pane".to_owned())
-            }
             Self::AirReturn => {
                 let reach = match seen.air_reach()? {
                     reach if reach < design.scan.min_range => {
@@ -161,8 +159,6 @@ impl Unmodelled {
                 ))
             }
             Self::Afterpulsing => match design.detector {
-                // Histograms follow it.
-                _ if design.readout.histogram().is_some() => None,
                 Detector::PhotonCounting(_) | Detector::Geiger(_) => Some(format!(
                     "each per cent of it adds {} false detections to the marks of a shot",
                     rounded(0.01 * design.emission.coding().codebook.mean_weight())
