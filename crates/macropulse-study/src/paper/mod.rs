@@ -6,10 +6,13 @@ mod claims;
 mod conclusion;
 mod experiment;
 mod geometry;
+mod lidars;
 pub mod measured;
 mod pictures;
 mod receivers;
 mod report;
+mod side_by_side;
+mod side_by_side_page;
 mod tables;
 mod walls;
 
@@ -18,11 +21,13 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 pub use claim::{Claim, Verdict, listing};
-pub use claims::{NOT_MEASURED, RECOGNISED, judge, judge_on_paper};
+pub use claims::{COMPARED_M, NOT_MEASURED, RECOGNISED, judge, judge_on_paper};
 pub use experiment::{DISTANCES, SENSORS, Trial};
 pub use geometry::{Prediction, predict};
+pub use lidars::{AMCW, FMCW, LIDARS, Lidar, PULSED};
 pub use measured::{Measured, OnPaper};
 pub use receivers::{Comparison, PERFECT};
+pub use side_by_side::Side;
 pub use walls::Wall;
 
 use macropulse::design::Design;
@@ -92,6 +97,8 @@ pub struct Findings {
     pub trials: Vec<Trial>,
     /// The receivers compared.
     pub comparisons: Vec<Comparison>,
+    /// The five lidars in one scene.
+    pub sides: Vec<Side>,
     /// Numbers by which the claims are judged.
     pub measured: Measured,
     /// Claims of the paper, with their verdicts.
@@ -99,7 +106,8 @@ pub struct Findings {
 }
 
 /// Files that [`run`] writes beside the folders of its trials.
-pub const FILES: [&str; 4] = ["points.csv", "claims.json", "claims.md", crate::record::PAGE];
+pub const FILES: [&str; 5] =
+    ["points.csv", "lidars.csv", "claims.json", "claims.md", crate::record::PAGE];
 
 /// The folder of each trial of [`run`].
 pub fn folders() -> Vec<String> {
@@ -113,7 +121,7 @@ pub fn folders() -> Vec<String> {
 /// None of the ready sensors is refused, unless the program is broken.
 pub fn shots() -> Result<u64, Error> {
     let trials: u64 = designs()?.iter().map(Design::shots_per_scan).sum();
-    Ok(trials * DISTANCES.len() as u64 + receivers::shots()?)
+    Ok(trials * DISTANCES.len() as u64 + receivers::shots()? + side_by_side::shots()?)
 }
 
 fn designs() -> Result<Vec<Design>, Error> {
@@ -121,7 +129,7 @@ fn designs() -> Result<Vec<Design>, Error> {
 }
 
 /// Runs the whole experiment and writes into `folder`: one folder per sensor and distance,
-/// `points.csv`, `claims.json`, `claims.md`, and `index.html` last.
+/// `points.csv`, `lidars.csv`, `claims.json`, `claims.md`, and `index.html` last.
 ///
 /// # Errors
 /// If something cannot be written, or the watch says stop.
@@ -136,13 +144,17 @@ pub fn run(folder: &Path, seed: u64, watch: &Watch) -> Result<Findings, Error> {
     let trials = trials.collect::<Result<Vec<_>, Error>>()?;
     let comparisons = receivers::compare(seed, watch)?;
     let walls = walls::near_and_far(&designs, seed)?;
-    let measured = Measured::of(&designs[0], &trials, &comparisons, walls)?;
+    let (sides, methods) = side_by_side::measure(seed, watch)?;
+    let measured = Measured::of(&designs[0], &trials, &comparisons, walls, methods)?;
     let claims = judge(&measured);
     let environment = experiment::scene(DISTANCES[0])?.environment;
-    let findings = Findings { designs, environment, trials, comparisons, measured, claims };
-    let [points, claims, list, page] = FILES.map(|file| folder.join(file));
+    let findings = Findings { designs, environment, trials, comparisons, sides, measured, claims };
+    let [points, lidars, claims, list, page] = FILES.map(|file| folder.join(file));
     write_atomically(&points, |out| {
         out.write_all(tables::points_csv(&findings.trials).as_bytes())
+    })?;
+    write_atomically(&lidars, |out| {
+        out.write_all(side_by_side_page::csv(&findings.measured.methods).as_bytes())
     })?;
     write_atomically(&claims, |out| {
         serde_json::to_writer_pretty(&mut *out, &findings.claims)?;

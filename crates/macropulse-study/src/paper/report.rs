@@ -1,7 +1,7 @@
 //! The report: one page with every table and figure of \[KP16\], made again from data.
 
 use super::claim::Verdict;
-use super::{Error, Findings, conclusion, experiment, pictures, tables};
+use super::{Error, Findings, conclusion, experiment, pictures, side_by_side_page, tables};
 use crate::record;
 use crate::view::{Block, Page, Section, Tone};
 use macropulse::points::Outcome;
@@ -25,6 +25,7 @@ pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
     .section(counts(findings))
     .section(title(findings))
     .section(receivers(findings))
+    .section(side_by_side_page::section(findings)?)
     .section(claims(findings))
     .section(conclusion(findings))
     .section(verdict(findings))
@@ -40,7 +41,7 @@ pub(super) fn page(findings: &Findings, seed: u64) -> Result<Page, Error> {
 
 /// Returns the files beside the page: the tables, and for each trial a page to explore its cloud.
 fn files(findings: &Findings) -> Vec<String> {
-    let tables = super::FILES[..3].iter().map(|file| (*file).to_owned());
+    let tables = super::FILES[..super::FILES.len() - 1].iter().map(|file| (*file).to_owned());
     let pages = findings.trials.iter().map(|trial| {
         format!("{}/{}", experiment::folder(trial.sensor, trial.distance), record::PAGE)
     });

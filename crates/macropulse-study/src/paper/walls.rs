@@ -31,6 +31,16 @@ pub struct Wall {
     pub error: f64,
 }
 
+/// A wall of the diffuse reflectance `diffuse` at `distance` metres in all directions, in a ready `environment`.
+pub(super) fn around((distance, diffuse): (f64, f64), environment: &str) -> Result<Scene, Error> {
+    let text = format!(
+        "version = 1\nenvironment = \"{environment}\"\n[[material]]\nname = \"paint\"\n\
+         diffuse = {diffuse:?}\n[[object]]\nshape.sphere.radius_m = {distance:?}\n\
+         material = \"paint\"\n"
+    );
+    Ok(Scene::from_toml(&text, "wall", Path::new(""))?)
+}
+
 impl Wall {
     /// A wall of the diffuse reflectance `diffuse`, in a ready `environment`, at which about `shots` are
     /// fired.
@@ -40,12 +50,7 @@ impl Wall {
         environment: &str,
         (shots, seed): (u64, u64),
     ) -> Result<Self, Error> {
-        let text = format!(
-            "version = 1\nenvironment = \"{environment}\"\n[[material]]\nname = \"paint\"\n\
-             diffuse = {diffuse:?}\n[[object]]\nshape.sphere.radius_m = {distance:?}\n\
-             material = \"paint\"\n"
-        );
-        let scene = Scene::from_toml(&text, "wall", Path::new(""))?;
+        let scene = around((distance, diffuse), environment)?;
         let every = (design.shots_per_scan() / shots).max(1);
         let (mut score, mut squares) = (Score::default(), Vec::new());
         for number in 0..shots.div_ceil(design.shots_per_scan()) {

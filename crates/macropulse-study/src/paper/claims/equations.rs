@@ -1,10 +1,34 @@
 //! Results of Eqs. 1, 3 and 4 when they are tried.
 
 use crate::paper::claim::{Claim, said};
-use crate::paper::measured::Equations;
+use crate::paper::measured::{Equations, Ranging};
+
+/// Share of a range by which a measurement may be off and still give it.
+const WITHIN: f64 = 1e-3;
+
+fn is_at(range: f64, wall: f64) -> bool {
+    (range / wall - 1.0).abs() < WITHIN
+}
+
+/// Tells if Eq. 1 and the lidar's own receiver find a wall.
+pub(super) fn gives(found: &Ranging) -> bool {
+    is_at(found.equation, found.wall) && is_at(found.points, found.wall)
+}
+
+/// A wall in words.
+pub(super) fn told(found: &Ranging) -> String {
+    format!(
+        "{:.4} m \u{b1} {:.1} mm, simulated, of a wall at {:.0} m",
+        found.equation,
+        found.error * 1e3,
+        found.wall
+    )
+}
 
 pub(super) fn claims(found: &Equations) -> Vec<Claim> {
-    let gives = |range: f64| (range / found.range - 1.0).abs() < 1e-9;
+    let (phase, beyond) = (&found.amplitude, &found.amplitude_beyond);
+    let [near, far] = &found.frequency;
+    let printed = [near, far].iter().all(|wall| is_at(wall.printed, wall.found.wall));
     vec![
         said(
             "eq1-amcw",
@@ -13,12 +37,17 @@ pub(super) fn claims(found: &Equations) -> Vec<Claim> {
             "d = \u{3d5}c/(4\u{3c0}f)",
         )
         .holds_or_partly(
-            gives(found.amplitude) && found.phase_wraps.is_infinite(),
-            gives(found.amplitude),
+            gives(phase) && gives(beyond),
+            gives(phase),
             format!(
-                "{:.6} m from the phase of 64 samples of a wave from {:.0} m; the same phase comes \
-                 again every c/2f, here {:.0} m, which the equation does not say",
-                found.amplitude, found.range, found.phase_wraps
+                "{} from the phase of its taps, {:.3} m by the lidar's own receiver. The same phase \
+                 comes again every c/2f, here {:.1} m, which the equation does not say: a wall at \
+                 {:.1} m is found at {:.3} m",
+                told(phase),
+                phase.points,
+                found.phase_wraps,
+                beyond.wall,
+                beyond.equation
             ),
         ),
         said(
@@ -28,13 +57,21 @@ pub(super) fn claims(found: &Equations) -> Vec<Claim> {
             "d = cBT/(4\u{394}f)",
         )
         .holds_or_partly(
-            gives(found.frequency_printed),
-            gives(found.frequency),
+            printed,
+            gives(&near.found) && gives(&far.found),
             format!(
-                "{:.6} m of {:.0} m for a triangular sweep if B is the beat frequency, T the period \
-                 and \u{394}f the excursion; with \u{394}f the difference between what is sent and \
-                 received, as the text has it, {:.0} m whatever the range",
-                found.frequency, found.range, found.frequency_printed
+                "{} from the beats of a triangular sweep, {:.3} m by the lidar's own receiver, if B is \
+                 the beat frequency, T the period and \u{394}f the excursion; a wall at {:.0} m is \
+                 found at {:.3} m. With \u{394}f the difference between what is sent and received, as \
+                 the text has it, {:.0} m whatever the range; with B a bandwidth then, {:.0} m and for \
+                 the farther wall {:.0} m",
+                told(&near.found),
+                near.found.points,
+                far.found.wall,
+                far.found.equation,
+                near.printed,
+                near.swapped,
+                far.swapped
             ),
         ),
         said(

@@ -1,8 +1,9 @@
 //! Claims of the paper on its simulation.
 
+use super::equations::{gives, told};
 use crate::paper::claim::{Claim, Verdict, in_three, said};
 use crate::paper::experiment::{DISTANCES, SENSORS};
-use crate::paper::measured::{Converters, Experiment, Measured, Seen, Timing};
+use crate::paper::measured::{Converters, Experiment, Measured, Ranging, Seen, Timing};
 use crate::paper::walls::Wall;
 
 /// Samples across an object with which half of the people recognise it: four line pairs
@@ -17,7 +18,7 @@ pub(super) fn claims(measured: &Measured) -> Vec<Claim> {
     let found = &measured.experiment;
     let on_paper = &measured.on_paper;
     vec![
-        time_of_flight(found, &on_paper.timing),
+        time_of_flight(found, &on_paper.timing, &on_paper.equations.pulse),
         falls(found),
         more_points(found),
         ratio(found, "hdl-64e", ("ratio-hdl-64e", "10 times as many points as the HDL-64E", 10.0)),
@@ -49,7 +50,7 @@ fn distances() -> String {
     DISTANCES.map(|d| d.to_string()).join(", ")
 }
 
-fn time_of_flight(found: &Experiment, timing: &Timing) -> Claim {
+fn time_of_flight(found: &Experiment, timing: &Timing, pulse: &Ranging) -> Claim {
     let seen: Vec<&Seen> = DISTANCES.iter().filter_map(|&d| found.at(PROPOSED, d)).collect();
     let half_tick = macropulse::units::range_from_tof(timing.tick) / 2.0;
     let biases: Vec<String> = seen.iter().map(|s| format!("{:+.3}", s.bias * 1e3)).collect();
@@ -60,18 +61,30 @@ fn time_of_flight(found: &Experiment, timing: &Timing) -> Claim {
         "d = c\u{394}t/2",
     )
     .holds_if(
-        !seen.is_empty() && seen.iter().all(|s| s.bias.abs() < half_tick),
+        !seen.is_empty() && seen.iter().all(|s| s.bias.abs() < half_tick) && gives(pulse),
         format!(
-            "the middle error of the points on the car at {} m is {} mm; half a tick is {:.3} mm",
+            "the middle error of the points on the car at {} m is {} mm; half a tick is {:.3} mm. A \
+             lidar of single pulses: {}",
             distances(),
             biases.join(", "),
-            half_tick * 1e3
+            half_tick * 1e3,
+            told(pulse)
         ),
     )
 }
 
 /// Growth of an error that counts as none, as a share of it.
-const NO_GROWTH: f64 = 0.05;
+pub(super) const NO_GROWTH: f64 = 0.05;
+
+/// Verdict on a fall of accuracy, the error of `growing` of `all` lidars growing and that of `constant` not.
+pub(super) fn falling(growing: usize, constant: usize, all: usize) -> Verdict {
+    match (growing, constant) {
+        (growing, _) if all > 0 && growing == all => Verdict::Holds,
+        (1.., 1..) => Verdict::Partly,
+        (0, constant) if all > 0 && constant == all => Verdict::Fails,
+        _ => Verdict::Unsaid,
+    }
+}
 
 /// Growth is by more than two standard errors of the difference. No growth is told only where two
 /// standard errors more than was found are less than [`NO_GROWTH`] of the error near by.
@@ -102,12 +115,7 @@ fn falls(found: &Experiment) -> Claim {
         "regardless of the method",
     )
     .is(
-        match (growing, constant) {
-            (growing, _) if all > 0 && growing == all => Verdict::Holds,
-            (1.., 1..) => Verdict::Partly,
-            (0, constant) if all > 0 && constant == all => Verdict::Fails,
-            _ => Verdict::Unsaid,
-        },
+        falling(growing, constant, all),
         format!(
             "rms range error on a wall of 50 %: {}; it grows for {growing} of {all} lidars, and for \
              {constant} it grows by less than {:.0} %",

@@ -6,9 +6,12 @@ mod conclusion;
 mod equations;
 mod experiment;
 mod light;
+mod methods;
 mod system;
 
 pub use experiment::RECOGNISED;
+pub use methods::COMPARED_M;
+pub(super) use methods::line;
 
 use super::claim::Claim;
 use super::measured::{Measured, OnPaper};
@@ -20,6 +23,7 @@ pub const NOT_MEASURED: [&str; 2] = ["end-robots", "end-surroundings"];
 pub fn judge(measured: &Measured) -> Vec<Claim> {
     let mut claims = judge_on_paper(&measured.on_paper);
     claims.extend(experiment::claims(measured));
+    claims.extend(methods::claims(&measured.methods));
     claims.extend(conclusion::claims(measured));
     claims
 }

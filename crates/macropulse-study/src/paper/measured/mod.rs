@@ -5,14 +5,18 @@
 mod code;
 mod equations;
 mod experiment;
+mod methods;
 mod outlook;
+mod ranging;
 mod roles;
 mod system;
 
 pub use code::{Payloads, Repaired, Words};
 pub use equations::Equations;
 pub use experiment::{Experiment, Seen, Share};
+pub use methods::{Methods, Place, Reach};
 pub use outlook::{Closing, Outlook};
+pub use ranging::Ranging;
 pub use roles::{Part, Role};
 pub use system::{Converters, Head, Light, Timing};
 
@@ -54,7 +58,7 @@ impl OnPaper {
         Ok(Self {
             words: Words::of(design)?,
             payloads: Payloads::of(design),
-            equations: Equations::of(design),
+            equations: Equations::of(design)?,
             timing: Timing::of(design),
             converters: Converters::of(design)?,
             light: Light::of(design)?,
@@ -73,6 +77,8 @@ pub struct Measured {
     pub experiment: Experiment,
     /// Roles of the blocks of Fig. 7 in the text.
     pub roles: Vec<Role>,
+    /// Reach and precision of lidars of different methods.
+    pub methods: Methods,
 }
 
 impl Measured {
@@ -81,11 +87,13 @@ impl Measured {
         trials: &[Trial],
         comparisons: &[Comparison],
         walls: Vec<[Wall; 2]>,
+        methods: Methods,
     ) -> Result<Self, Error> {
         Ok(Self {
             on_paper: OnPaper::of(design)?,
             experiment: Experiment { walls, ..Experiment::of(trials, comparisons) },
             roles: roles::printed(),
+            methods,
         })
     }
 }
