@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use macropulse::formats::is_of_scan;
 use macropulse::sim::Watch;
+use macropulse_study::paper::measured::Reach;
 use macropulse_study::paper::{self, Findings, Verdict};
 use macropulse_study::record::{MANIFEST, PAGE};
 use serde_json::json;
@@ -84,7 +85,44 @@ fn json(findings: &Findings) -> serde_json::Value {
             })
         })
         .collect();
-    json!({ "points": points, "claims": findings.claims })
+    let methods = &findings.measured.methods;
+    json!({
+        "points": points,
+        "lidars": methods.lidars.iter().map(reach).collect::<Vec<_>>(),
+        "fmcw_by_linewidth": methods.lines.iter().map(line).collect::<Vec<_>>(),
+        "claims": findings.claims,
+    })
+}
+
+/// A lidar before walls at growing distance. Numbers that are not there are `null`.
+fn reach(reach: &Reach) -> serde_json::Value {
+    let places = reach.places.iter().map(|place| {
+        let forecast = reach.forecast(place.range);
+        json!({
+            "range_m": place.range,
+            "shots": place.shots,
+            "pd": place.pd[0],
+            "pd_interval": [place.pd[1], place.pd[2]],
+            "precision_m": place.precision,
+            "pd_forecast": forecast.map(|[pd, _]| pd),
+            "precision_forecast_m": forecast.map(|[_, precision]| precision),
+        })
+    });
+    let [half, low, high] = reach.half();
+    json!({
+        "lidar": reach.lidar,
+        "half_m": half,
+        "half_interval_m": [low, high],
+        "half_forecast_m": reach.half_forecast(),
+        "places": places.collect::<Vec<_>>(),
+    })
+}
+
+/// The FMCW lidar with a laser of this line.
+fn line((hz, found): &(f64, Reach)) -> serde_json::Value {
+    let mut value = reach(found);
+    value["linewidth_khz"] = json!(hz * 1e-3);
+    value
 }
 
 fn text(findings: &Findings) -> String {

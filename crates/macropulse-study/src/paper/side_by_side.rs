@@ -29,6 +29,9 @@ const ENVIRONMENT: &str = "clear-day";
 /// Shots at each wall: a share of a half is known to 0.022, one standard deviation.
 pub(super) const SHOTS: u64 = 512;
 
+/// Steps of a forecast from each wall to the next.
+const BETWEEN: u32 = 4;
+
 /// Widths of the line of the FMCW laser, kHz. The first is that of the ready sensor.
 const LINES_KHZ: [f64; 4] = [10.0, 100.0, 1000.0, 10_000.0];
 
@@ -91,6 +94,19 @@ fn one(
     Ok((Side { lidar, design, cloud, score: scan.score, precision, unforecast }, reach))
 }
 
+/// Pd and precision as forecast, at the walls and between them: range, Pd, precision.
+fn curve(forecaster: &Forecaster) -> Vec<[f64; 3]> {
+    let between = RANGES.windows(2).flat_map(|pair| {
+        let part = |step: u32| f64::from(step) / f64::from(BETWEEN);
+        (0..BETWEEN).map(move |step| pair[0] * libm::pow(pair[1] / pair[0], part(step)))
+    });
+    let forecast = |range: f64| {
+        let it = forecaster.forecast(REFLECTANCE, range);
+        [range, it.pd, it.precision.unwrap_or(f64::NAN)]
+    };
+    between.chain(RANGES.last().copied()).map(forecast).collect()
+}
+
 /// The bands of the first `shots` of a scan.
 pub(super) fn first_shots(design: &Design, shots: u64) -> Vec<Band> {
     let begun = bands(design, 0).take_while(|band| band.first < shots);
@@ -110,8 +126,6 @@ fn reach(lidar: &'static str, design: &Design, seed: u64, watch: &Watch) -> Resu
         let seen = score.count(Outcome::Right) + score.count(Outcome::Near);
         let pd = Estimate::of_rate(&[[seen, score.with_echo()]]);
         let spread = RangeError::of_spread(&scan.cloud(), design.right_within);
-        let forecast = Forecaster::new(design, &scene.environment).ok();
-        let forecast = forecast.map(|it| it.forecast(REFLECTANCE, range));
         Ok(Place {
             range,
             shots: score.with_echo(),
@@ -119,9 +133,10 @@ fn reach(lidar: &'static str, design: &Design, seed: u64, watch: &Watch) -> Resu
             pd: [pd.value, pd.low, pd.high],
             precision: spread.deviation.unwrap_or(f64::NAN),
             points: spread.count,
-            forecast: forecast.map(|it| (it.pd, it.precision.unwrap_or(f64::NAN))),
         })
     };
     let places = RANGES.par_iter().map(place).collect::<Result<Vec<_>, Error>>()?;
-    Ok(Reach { lidar, places })
+    let sky = walls::around((RANGES[0], REFLECTANCE), ENVIRONMENT)?.environment;
+    let curve = Forecaster::new(design, &sky).map_or_else(|_| Vec::new(), |it| curve(&it));
+    Ok(Reach { lidar, places, curve })
 }

@@ -16,6 +16,9 @@ use macropulse::units::s_from_fs;
 /// Width of a range image, px.
 const WIDTH: usize = 560;
 
+/// A factor between a precision and its forecast that is worth a word.
+const APART: f64 = 1.5;
+
 /// Ends of the colours of the range images, m.
 const COLOURS: [f32; 2] = [5.0, 125.0];
 
@@ -48,6 +51,7 @@ pub(super) fn section(findings: &Findings) -> Result<Section, Error> {
     }
     Ok(section
         .figure(precision(methods))
+        .paragraph(&apart(methods))
         .table(numbers(methods))
         .block(Block::Heading("Long, middle and short distances".into()))
         .paragraph(
@@ -71,7 +75,7 @@ pub(super) fn csv(methods: &Methods) -> String {
         let khz = hz.map(|hz| format!("{:.0}", hz * 1e-3)).unwrap_or_default();
         for place in &reach.places {
             let Place { range, shots, seen, pd: [pd, low, high], precision, .. } = place;
-            let (forecast, spread) = place.forecast.unwrap_or((f64::NAN, f64::NAN));
+            let [forecast, spread] = reach.forecast(*range).unwrap_or([f64::NAN; 2]);
             text += &format!(
                 "{},{khz},{range},{shots},{seen},{pd:.5},{low:.5},{high:.5},{},{},{}\n",
                 reach.lidar,
@@ -148,8 +152,7 @@ fn detection(methods: &Methods) -> Figure {
     for (reach, hue) in methods.lidars.iter().zip(Hue::ALL) {
         let found = reach.places.iter().map(|place| [place.range, place.pd[0]]).collect();
         chart = chart.series(reach.lidar, Style::Points, found);
-        let forecast = reach.places.iter().filter_map(|it| Some([it.range, it.forecast?.0]));
-        let forecast = forecast.collect();
+        let forecast = reach.curve.iter().map(|[range, pd, _]| [*range, *pd]).collect();
         chart = chart.series("", Style::Line, forecast);
         chart.series.iter_mut().rev().take(2).for_each(|series| series.hue = hue);
         let strokes = reach.places.iter().map(|place| [place.range, place.pd[1], place.pd[2]]);
@@ -168,9 +171,10 @@ fn precision(methods: &Methods) -> Figure {
     let y = Axis::log("standard deviation of the range, mm");
     let mut chart = Chart::new("Precision against range, five lidars", x, y);
     for (reach, hue) in methods.lidars.iter().zip(Hue::ALL) {
-        let seen = || reach.places.iter().filter(|place| place.pd[0] >= 0.5);
-        let found = seen().map(|place| [place.range, place.precision * 1e3]).collect();
-        let forecast = seen().filter_map(|it| Some([it.range, it.forecast?.1 * 1e3])).collect();
+        let seen = reach.places.iter().filter(|place| place.pd[0] >= 0.5);
+        let found = seen.map(|place| [place.range, place.precision * 1e3]).collect();
+        let forecast = reach.curve.iter().filter(|[_, pd, _]| *pd >= 0.5);
+        let forecast = forecast.map(|[range, _, spread]| [*range, *spread * 1e3]).collect();
         chart = chart.series(reach.lidar, Style::Points, found).series("", Style::Line, forecast);
         chart.series.iter_mut().rev().take(2).for_each(|series| series.hue = hue);
     }
@@ -179,6 +183,33 @@ fn precision(methods: &Methods) -> Figure {
         "Standard deviation of the range of walls of which half of the shots are seen: simulated (dots) \
          and forecast (curves).",
     )
+}
+
+/// Names the walls at which the precision is not as forecast.
+fn apart(methods: &Methods) -> String {
+    let mut words = Vec::new();
+    for reach in &methods.lidars {
+        let is_apart = |place: &&Place| {
+            let forecast = reach.forecast(place.range).filter(|_| place.pd[0] >= 0.5);
+            forecast.is_some_and(|[_, spread]| {
+                let ratio = place.precision / spread;
+                !(1.0 / APART..=APART).contains(&ratio)
+            })
+        };
+        let walls = reach.places.iter().filter(is_apart);
+        let walls: Vec<String> = walls.map(|place| format!("{:.0} m", place.range)).collect();
+        if !walls.is_empty() {
+            words.push(format!("{} at {}", reach.lidar, walls.join(" and ")));
+        }
+    }
+    match words.is_empty() {
+        true => format!("No precision is off its forecast by a factor of {APART} or more."),
+        false => format!(
+            "Precisions off their forecast by a factor of {APART} or more: {}. Light so near is too bright \
+             for a closed form that sums up weak light.",
+            words.join(", ")
+        ),
+    }
 }
 
 /// Pd and precision at each wall.
@@ -226,6 +257,7 @@ fn reaches(methods: &Methods) -> Table {
     let at = COMPARED_M.map(|range| format!("precision at {range:.0} m, mm"));
     let mut header = vec![("method", Align::Left), ("Pd below a half from, m", Align::Right)];
     header.push(("interval of 95 %, m", Align::Right));
+    header.push(("forecast, m", Align::Right));
     header.extend(at.iter().map(|title| (title.as_str(), Align::Right)));
     let named = methods.lidars.iter().filter(|reach| reach.lidar != super::FMCW);
     let named = named.map(|reach| (reach.lidar.to_owned(), reach));
@@ -239,6 +271,8 @@ fn reaches(methods: &Methods) -> Table {
         };
         let mut cells = vec![Cell::from(name), Cell::from(bounded(half))];
         cells.push(Cell::from(format!("{} \u{2026} {}", bounded(low), bounded(high))));
+        let forecast = reach.half_forecast().map(bounded);
+        cells.push(Cell::from(forecast.unwrap_or_default()));
         for range in COMPARED_M {
             let seen = reach.at(range).filter(|place| place.pd[0] >= 0.5);
             let cell = seen.map(|place| format!("{:.1}", place.precision * 1e3));

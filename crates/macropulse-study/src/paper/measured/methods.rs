@@ -16,6 +16,8 @@ pub struct Reach {
     pub lidar: &'static str,
     /// What it saw of each wall, nearest first.
     pub places: Vec<Place>,
+    /// Range, Pd and precision as forecast, at the walls and between them; empty without a forecast.
+    pub curve: Vec<[f64; 3]>,
 }
 
 /// What a lidar saw of one wall.
@@ -33,8 +35,6 @@ pub struct Place {
     pub precision: f64,
     /// Points that it was taken of.
     pub points: u64,
-    /// Pd and precision as forecast, if there is a forecast.
-    pub forecast: Option<(f64, f64)>,
 }
 
 impl Methods {
@@ -47,25 +47,40 @@ impl Methods {
 impl Reach {
     /// Range at which Pd falls below a half, and the ends of its interval of 95 %: where Pd and the ends of its interval do.
     pub fn half(&self) -> [f64; 3] {
-        [0, 1, 2].map(|end| self.falls_below(0.5, |place| place.pd[end]))
+        [0, 1, 2].map(|end| falls_below_half(self.places.iter().map(|it| [it.range, it.pd[end]])))
     }
 
-    /// Range at which `value` falls below `level`, linear in the logarithm of range between two walls; 0 if it is below at
-    /// the nearest wall, infinite if at none.
-    fn falls_below(&self, level: f64, value: impl Fn(&Place) -> f64) -> f64 {
-        let Some(at) = self.places.iter().position(|place| value(place) < level) else {
-            return f64::INFINITY;
-        };
-        let Some(before) = at.checked_sub(1).map(|before| &self.places[before]) else { return 0.0 };
-        let after = &self.places[at];
-        let part = (value(before) - level) / (value(before) - value(after));
-        before.range * libm::pow(after.range / before.range, part)
+    /// The same range as forecast, if there is a forecast.
+    pub fn half_forecast(&self) -> Option<f64> {
+        let curve = self.curve.iter().map(|[range, pd, _]| [*range, *pd]);
+        (!self.curve.is_empty()).then(|| falls_below_half(curve))
+    }
+
+    /// Pd and precision of the wall at this range as forecast.
+    pub fn forecast(&self, range: f64) -> Option<[f64; 2]> {
+        let near = |it: &&[f64; 3]| (it[0] / range - 1.0).abs() < 1e-9;
+        self.curve.iter().find(near).map(|[_, pd, precision]| [*pd, *precision])
     }
 
     /// What it saw of the wall at this range.
     pub fn at(&self, range: f64) -> Option<&Place> {
         self.places.iter().find(|place| place.range == range)
     }
+}
+
+/// Range at which the second of these values falls below a half, linear in the logarithm of the first, a range, between two
+/// of them; 0 if it is below at the nearest, infinite if at none.
+fn falls_below_half(values: impl Iterator<Item = [f64; 2]>) -> f64 {
+    let mut before: Option<[f64; 2]> = None;
+    for [range, value] in values {
+        if value < 0.5 {
+            return before.map_or(0.0, |[near, high]| {
+                near * libm::pow(range / near, (high - 0.5) / (high - value))
+            });
+        }
+        before = Some([range, value]);
+    }
+    f64::INFINITY
 }
 
 #[cfg(test)]
@@ -80,9 +95,9 @@ mod tests {
             pd: [pd, pd - 0.1, pd + 0.1],
             precision: 0.01,
             points: 100,
-            forecast: None,
         };
-        Reach { lidar: "", places: pds.iter().map(place).collect() }
+        let curve = pds.iter().map(|&(range, pd)| [range, pd, 0.02]).collect();
+        Reach { lidar: "", places: pds.iter().map(place).collect(), curve }
     }
 
     #[test]
@@ -90,6 +105,9 @@ mod tests {
         let [half, low, high] = reach(&[(10.0, 1.0), (40.0, 0.75), (90.0, 0.25)]).half();
         approx::assert_relative_eq!(half, 60.0, max_relative = 1e-12);
         assert!(40.0 < low && low < half && half < high && high < 90.0);
+        let reach = reach(&[(10.0, 1.0), (40.0, 0.75), (90.0, 0.25)]);
+        approx::assert_relative_eq!(reach.half_forecast().unwrap_or(0.0), half);
+        assert_eq!((reach.forecast(40.0), reach.forecast(41.0)), (Some([0.75, 0.02]), None));
     }
 
     #[test]

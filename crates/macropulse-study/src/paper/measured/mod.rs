@@ -16,7 +16,7 @@ pub use equations::Equations;
 pub use experiment::{Experiment, Seen, Share};
 pub use methods::{Methods, Place, Reach};
 pub use outlook::{Closing, Outlook};
-pub use ranging::Ranging;
+pub use ranging::{Ranging, Triangles};
 pub use roles::{Part, Role};
 pub use system::{Converters, Head, Light, Timing};
 
