@@ -29,7 +29,7 @@ static RUN: LazyLock<Run> = LazyLock::new(|| {
 
 static MEASURED: LazyLock<&Measured> = LazyLock::new(|| &RUN.measured);
 
-/// What a run leaves.
+/// Results of a run.
 struct Run {
     measured: Measured,
     page: String,
@@ -363,8 +363,9 @@ fn the_page_shows_five_lidars_side_by_side() {
     assert_eq!(RUN.table.lines().count(), 1 + (LIDARS.len() + 4) * 9);
 }
 
-/// Pd of N = 512 shots at each of nine walls of five lidars, seed 1, is that of the forecast, to 4 standard deviations
-/// (α = 3e-3 for all 45) and 0.03 of the closed forms. Control: a forecast for walls 1.4 times as far is not.
+/// Pd is that of the forecast, N = 512 shots at each of eight walls of five lidars, seed 1. Accepted are 4 standard
+/// deviations (α = 3e-3 for all 40) and 0.03 for the closed forms. Control: the forecast for the next wall is not the
+/// same.
 #[test]
 fn five_lidars_see_as_far_as_forecast() {
     let is_off = |[found, forecast]: [f64; 2]| {
@@ -383,12 +384,13 @@ fn five_lidars_see_as_far_as_forecast() {
     }
 }
 
-/// Range at which half of the shots are missed, simulated and forecast: to 8 %, as walls stand 1.4 times as far from each
-/// other. Also with other lasers, up to a line of 1 MHz.
+/// The range at which half of the shots are missed is that of the forecast, N = 512 shots at each wall, seed 1, to 8 %.
+/// Each wall is 1.4 times as far as the one before. With lines beyond 100 kHz many points are off by more than 0.35 m,
+/// and the forecast counts these too.
 #[test]
 fn reach_is_as_forecast() {
     let methods = &MEASURED.methods;
-    let lines = methods.lines.iter().filter(|(hz, _)| *hz <= 1e6).map(|(_, reach)| reach);
+    let lines = methods.lines.iter().filter(|(hz, _)| *hz <= 1e5).map(|(_, reach)| reach);
     for reach in methods.lidars.iter().chain(lines) {
         let ([half, ..], forecast) = (reach.half(), reach.half_forecast().unwrap());
         let is_alike = half == forecast || (half / forecast - 1.0).abs() < 0.08;

@@ -56,7 +56,8 @@ pub(super) fn section(findings: &Findings) -> Result<Section, Error> {
         .block(Block::Heading("Long, middle and short distances".into()))
         .paragraph(
             "The reach of a lidar is the range at which it misses half of its shots. That of FMCW depends \
-             on the line of its laser: light that comes back after its phase was lost makes no beat.",
+             on the line of its laser: light that comes back after its phase was lost makes no beat. The \
+             simulation counts points within 0.35 m, the forecast all of them.",
         )
         .figure(lines(methods))
         .table(reaches(methods)))
@@ -70,14 +71,14 @@ pub(super) fn csv(methods: &Methods) -> String {
     );
     let named = methods.lidars.iter().map(|reach| (None, reach));
     let lines = methods.lines.iter().map(|(hz, reach)| (Some(hz), reach));
-    let number = |value: f64| if value.is_nan() { String::new() } else { format!("{value:.5}") };
+    let number = |value: f64| if value.is_nan() { String::new() } else { format!("{value:.7}") };
     for (hz, reach) in named.chain(lines) {
         let khz = hz.map(|hz| format!("{:.0}", hz * 1e-3)).unwrap_or_default();
         for place in &reach.places {
             let Place { range, shots, seen, pd: [pd, low, high], precision, .. } = place;
             let [forecast, spread] = reach.forecast(*range).unwrap_or([f64::NAN; 2]);
             text += &format!(
-                "{},{khz},{range},{shots},{seen},{pd:.5},{low:.5},{high:.5},{},{},{}\n",
+                "{},{khz},{range},{shots},{seen},{pd:.7},{low:.7},{high:.7},{},{},{}\n",
                 reach.lidar,
                 number(*precision),
                 number(forecast),

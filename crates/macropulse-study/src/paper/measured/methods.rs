@@ -14,13 +14,13 @@ pub struct Methods {
 pub struct Reach {
     /// Its name.
     pub lidar: &'static str,
-    /// What it saw of each wall, nearest first.
+    /// Its results at each wall, nearest first.
     pub places: Vec<Place>,
     /// Range, Pd and precision as forecast, at the walls and between them; empty without a forecast.
     pub curve: Vec<[f64; 3]>,
 }
 
-/// What a lidar saw of one wall.
+/// A lidar before one wall.
 #[derive(Debug, Clone)]
 pub struct Place {
     /// Distance of the wall.
@@ -62,14 +62,14 @@ impl Reach {
         self.curve.iter().find(near).map(|[_, pd, precision]| [*pd, *precision])
     }
 
-    /// What it saw of the wall at this range.
+    /// Its result at the wall of this range.
     pub fn at(&self, range: f64) -> Option<&Place> {
         self.places.iter().find(|place| place.range == range)
     }
 }
 
-/// Range at which the second of these values falls below a half, linear in the logarithm of the first, a range, between two
-/// of them; 0 if it is below at the nearest, infinite if at none.
+/// Range at which Pd falls below a half, out of pairs of range and Pd. Between two pairs Pd is linear in the logarithm of
+/// range. The result is 0 if Pd is below at the nearest range, and infinite if at none.
 fn falls_below_half(values: impl Iterator<Item = [f64; 2]>) -> f64 {
     let mut before: Option<[f64; 2]> = None;
     for [range, value] in values {

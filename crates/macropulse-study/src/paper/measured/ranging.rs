@@ -1,4 +1,4 @@
-//! Range by Eq. 1 out of what receivers are given: simulated walls at known range, white, in the dark.
+//! Range by Eq. 1 out of the records that receivers are given: simulated walls at known range, white, in the dark.
 
 use std::f64::consts::TAU;
 
@@ -50,8 +50,8 @@ pub struct Triangles {
     pub swapped: f64,
 }
 
-/// A wall at `wall` metres before `design`: the mean of each of the values that `read` has of a return and of what the
-/// receiver was given of its shot, the standard error of the first of them, and the mean range of the returns.
+/// A wall at `wall` metres before `design`, and the mean of each value of `read`. That is given the time of flight of a
+/// return, s, the record of its band and its shot there. The range by Eq. 1 is its first value.
 fn measured<const N: usize>(
     design: &Design,
     wall: f64,
@@ -90,7 +90,8 @@ pub(super) fn pulses() -> Result<Ranging, Error> {
     Ok(measured(&design, RANGE, |flight, _, _| Some([pulsed(flight)]))?.0)
 }
 
-/// d = ϕ·c/(4π·f), ϕ from the taps: a wall, another one as much farther as its phase comes round after, and that range.
+/// d = ϕ·c/(4π·f), ϕ from the taps. The second wall is farther by the range after which the phase comes round, the third
+/// result.
 pub(super) fn phases() -> Result<(Ranging, Ranging, f64), Error> {
     let tone = format!("[{:?}]", MODULATION * 1e-6);
     let design = named(AMCW).design(&[
