@@ -385,7 +385,7 @@ fn five_lidars_see_as_far_as_forecast() {
 }
 
 /// The range at which half of the shots are missed is that of the forecast, N = 512 shots at each wall, seed 1, to 8 %.
-/// Each wall is 1.4 times as far as the one before. With lines beyond 100 kHz many points are off by more than 0.35 m,
+/// A wall is 1.4 times as far as the one before. With lines beyond 100 kHz many points are off by more than 0.35 m,
 /// and the forecast counts these too.
 #[test]
 fn reach_is_as_forecast() {

@@ -56,8 +56,9 @@ pub(super) fn section(findings: &Findings) -> Result<Section, Error> {
         .block(Block::Heading("Long, middle and short distances".into()))
         .paragraph(
             "The reach of a lidar is the range at which it misses half of its shots. That of FMCW depends \
-             on the line of its laser: light that comes back after its phase was lost makes no beat. The \
-             simulation counts points within 0.35 m, the forecast all of them.",
+             on the line of its laser: light that comes back after its phase was lost makes no beat. \
+             Between two walls the normal quantile of Pd is drawn out in proportion to the logarithm of \
+             range. The simulation counts points within 0.35 m, the forecast all of them.",
         )
         .figure(lines(methods))
         .table(reaches(methods)))
@@ -271,7 +272,9 @@ fn reaches(methods: &Methods) -> Table {
             false => "beyond the walls".to_owned(),
         };
         let mut cells = vec![Cell::from(name), Cell::from(bounded(half))];
-        cells.push(Cell::from(format!("{} \u{2026} {}", bounded(low), bounded(high))));
+        let interval = (half.is_finite() || low.is_finite())
+            .then(|| format!("{} \u{2026} {}", bounded(low), bounded(high)));
+        cells.push(Cell::from(interval.unwrap_or_default()));
         let forecast = reach.half_forecast().map(bounded);
         cells.push(Cell::from(forecast.unwrap_or_default()));
         for range in COMPARED_M {

@@ -1,5 +1,7 @@
 //! How far lidars of different methods see, and how precisely, as plain numbers.
 
+use macropulse::codec::statistics::normal_quantile;
+
 /// The five lidars, and one of them with other lasers.
 #[derive(Debug, Clone, Default)]
 pub struct Methods {
@@ -68,17 +70,21 @@ impl Reach {
     }
 }
 
-/// Range at which Pd falls below a half, out of pairs of range and Pd. Between two pairs Pd is linear in the logarithm of
-/// range. The result is 0 if Pd is below at the nearest range, and infinite if at none.
+/// Pd nearer to 0 or 1 than this is held there: half a shot of 500.
+const HELD: f64 = 1e-3;
+
+/// Range at which Pd falls below a half, out of pairs of range and Pd. Between two pairs the normal quantile of Pd is
+/// linear in the logarithm of range. The result is 0 if Pd is below at the nearest range, and infinite if at none.
 fn falls_below_half(values: impl Iterator<Item = [f64; 2]>) -> f64 {
     let mut before: Option<[f64; 2]> = None;
-    for [range, value] in values {
-        if value < 0.5 {
+    for [range, pd] in values {
+        let quantile = normal_quantile(pd.clamp(HELD, 1.0 - HELD));
+        if quantile < 0.0 {
             return before.map_or(0.0, |[near, high]| {
-                near * libm::pow(range / near, (high - 0.5) / (high - value))
+                near * libm::pow(range / near, high / (high - quantile))
             });
         }
-        before = Some([range, value]);
+        before = Some([range, quantile]);
     }
     f64::INFINITY
 }
