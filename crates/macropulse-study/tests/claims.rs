@@ -333,7 +333,7 @@ fn a_block_that_stands_with_the_wrong_part_is_named() {
     assert!(row.measured.contains("1 of 4") && row.measured.contains("(red)"), "{}", row.measured);
 }
 
-/// The watch is told of as many shots as were announced.
+/// The watch is told of all shots that were announced.
 #[test]
 fn all_shots_are_told() {
     assert_eq!(RUN.shots, paper::shots().unwrap());

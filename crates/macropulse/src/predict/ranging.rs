@@ -1,6 +1,6 @@
 //! The three ways of measuring range that \[KP16 eq. 1\] names.
 //!
-//! Only the first one is simulated; the other two are here so that the equation can be checked.
+//! The equation is held here against the records of simulated walls.
 
 use crate::units::range_from_tof;
 

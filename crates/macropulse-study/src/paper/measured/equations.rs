@@ -15,7 +15,7 @@ pub struct Equations {
     pub amplitude: Ranging,
     /// Range at which its phase comes round.
     pub phase_wraps: f64,
-    /// A wall that is so much farther.
+    /// A wall that is farther by this range.
     pub amplitude_beyond: Ranging,
     /// A wall before a lidar whose frequency sweeps up and down, and one twice as far.
     pub frequency: [Triangles; 2],
