@@ -1,6 +1,6 @@
 //! The three ways of measuring range that \[KP16 eq. 1\] names.
 //!
-//! The equation is held here against the records of simulated walls.
+//! The report of the paper holds them against the records of simulated walls.
 
 use crate::units::range_from_tof;
 
