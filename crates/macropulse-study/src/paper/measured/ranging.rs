@@ -8,7 +8,7 @@ use crate::paper::side_by_side::first_shots;
 use crate::paper::walls;
 use macropulse::codec::decode::beat::Ramp;
 use macropulse::codec::{Beats, Given, Taps};
-use macropulse::design::Design;
+use macropulse::design::{Design, Emission};
 use macropulse::predict::ranging::{amplitude_modulated, frequency_modulated, pulsed};
 use macropulse::sim::{self, Scans};
 use macropulse::units::{range_from_tof, s_from_fs};
@@ -124,7 +124,7 @@ fn phase(taps: &Taps, shot: usize) -> f64 {
 /// d = c·B·T/(4·Δf) by its three readings, from the strongest beat of each ramp.
 pub(super) fn triangles() -> Result<[Triangles; 2], Error> {
     let design = named(FMCW).design(&[])?;
-    let Some(chirp) = design.emission.chirp() else { return Err(Error::Sensor) };
+    let Emission::Chirped(chirp) = &design.emission else { return Err(Error::Sensor) };
     let period = s_from_fs(chirp.up_fs + chirp.down_fs);
     let excursion = chirp.bandwidth;
     let ramps = chirp.ramps();
