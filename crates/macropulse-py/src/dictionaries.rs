@@ -47,7 +47,7 @@ fn set_column(columns: &Bound<'_, PyDict>, column: RecordColumn, shots: usize) -
     }
 }
 
-/// Adds an array to a dictionary; a table of so many `rows`, if it has rows.
+/// Adds an array to a dictionary: a table if its number of `rows` is given.
 fn set_values<T: Element>(
     columns: &Bound<'_, PyDict>,
     name: &str,

@@ -51,7 +51,7 @@ pub trait ShotRecord: Debug + Send + Sync {
     /// Appends the numbers of shot number `at` to `bytes`.
     fn write_shot(&self, at: usize, bytes: &mut Vec<u8>);
 
-    /// Takes the numbers of shot number `at` from `bytes`, as many as [`ShotRecord::length`] says.
+    /// Takes the numbers of shot number `at` from its `bytes`, whose length is [`ShotRecord::length`].
     fn read_shot(&mut self, at: usize, bytes: &[u8]);
 
     /// The record of shot number `at` alone.

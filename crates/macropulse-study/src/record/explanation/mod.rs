@@ -108,7 +108,7 @@ trait RecordExplanation {
     fn charts(&self, sent: &Sent) -> Option<Vec<(Chart, &'static str)>>;
 }
 
-/// What charts show beside the record.
+/// The content of charts beside the record.
 struct Sent<'a> {
     /// When the marks of the macropulse leave, in ticks.
     marks: &'a [u32],
