@@ -1,6 +1,6 @@
 //! Beats as files: what is written is read, what is wrong has a place, and nothing that is given makes a reader panic.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use macropulse_codec::files::{Digest, Error, RecordHeader, RecordReader, RecordWriter};
 use macropulse_codec::{Beats, Given, Peak};

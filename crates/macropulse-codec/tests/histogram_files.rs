@@ -1,7 +1,7 @@
 //! Histograms as files and as columns: what is written is read, what is wrong has a place, and nothing
 //! that is given makes a reader or a receiver panic.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use macropulse_codec::decode::histogram::{
     HistogramMethod, HistogramReceiver, PileUp, Pulse, decode,
