@@ -397,7 +397,8 @@ pub struct Tally {
     pub interferer_shots: u64,
     /// Detection events.
     pub detections: u64,
-    /// Things counted in the records that reached the receiver, as [`RecordKind::counted`] names them.
+    /// Things counted in the records that reached the receiver, as
+    /// [`RecordKind::counted`](macropulse_codec::RecordKind::counted) names them.
     pub recorded: u64,
     /// Detection events that fell into the tick of another one.
     pub merged: u64,
