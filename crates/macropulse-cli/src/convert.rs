@@ -69,20 +69,20 @@ impl Convert {
         let output = &self.output;
         let ending = output.extension().and_then(OsStr::to_str);
         let by_ending = ending.and_then(Format::of_extension);
+        let is_named = |format: &Format| ending.is_some_and(|ending| format.has_extension(ending));
         let formats = match (&self.format, by_ending) {
             (Some(formats), _) if formats.0.is_empty() => {
                 let remedy = "--format: nothing is to be written; name a format, as `ply`";
                 return Err(Fault::Wrong(remedy.to_owned()));
             }
-            (Some(Formats(formats, _)), Some(other))
-                if !output.is_dir()
-                    && !matches!(formats[..], [one] if one.extension() == other.extension()) =>
+            (Some(Formats(formats, _)), Some(_))
+                if !output.is_dir() && !matches!(formats[..], [one] if is_named(&one)) =>
             {
                 let output = output.display();
                 return Err(Fault::Wrong(format!(
                     "{output}: ends as a {} file does, where --format wants a folder or another \
                      ending; leave --format out, or give OUT another name",
-                    other.extension()
+                    ending.unwrap_or_default()
                 )));
             }
             (Some(formats), _) => formats.0.clone(),
@@ -110,9 +110,7 @@ impl Convert {
             }
         };
         let is_file = match formats.as_slice() {
-            [format] => {
-                ending == Some(format.extension()) && !output.is_dir() || is_written_through(output)
-            }
+            [format] => is_named(format) && !output.is_dir() || is_written_through(output),
             _ => false,
         };
         let name = output.file_name().filter(|_| is_file);

@@ -71,6 +71,18 @@ fn what_cannot_be_held_is_said() {
 }
 
 #[test]
+fn an_ending_of_a_format_in_either_case_names_one_file() {
+    let desk = desk();
+    for name in ["points.txt", "points.xyz", "POINTS.PLY"] {
+        let ran = desk.run(&format!("convert in/scan-000000.pcd -q -o {name}"));
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        assert!(desk.path().join(name).is_file(), "{name}");
+    }
+    let ran = desk.run("convert in/scan-000000.pcd --format ply -o points.txt");
+    assert!(ran.err.contains("ends as a txt file does"), "{}", ran.err);
+}
+
+#[test]
 fn a_file_that_was_cut_short_gives_its_finished_scans_and_a_sentence() {
     let desk = desk();
     let whole = fs::read(desk.path().join("in/scans.mcap")).unwrap();

@@ -10,7 +10,7 @@ use std::process::Command;
 
 use common::Desk;
 
-const FORMATS: &str = "pcd,ply,ply-cloudcompare,las,laz,e57,npy,csv,kitti,parquet,mcap,mcap-velodyne,\
+const FORMATS: &str = "pcd,ply,ply-cloudcompare,las,laz,e57,npy,csv,xyz,kitti,parquet,mcap,mcap-velodyne,\
                        mcap-ouster,mcap-livox,mcap-autoware,mcap-foxglove,mcap-osi,range-npy";
 
 /// A sensor that turns and moves in a street, by 2 m in a second, so that its poses differ.

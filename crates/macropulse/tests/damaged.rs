@@ -11,7 +11,8 @@ use proptest::prelude::*;
 use std::fs;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-const READABLE: [&str; 9] = ["pcd", "ply", "las", "laz", "e57", "npy", "csv", "kitti", "mcap"];
+const READABLE: [&str; 10] =
+    ["pcd", "ply", "las", "laz", "e57", "npy", "csv", "xyz", "kitti", "mcap"];
 
 /// More memory than sound readers take for a file of some ten kilobytes, kB. The image of a list may have all
 /// pixels of a sensor, 2²⁵, with 25 bytes each and the truth.

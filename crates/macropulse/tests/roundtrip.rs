@@ -253,13 +253,15 @@ fn las_and_laz_keep_coordinates_to_half_a_micrometre_and_all_else_as_it_is() {
 }
 
 #[test]
-fn kitti_keeps_four_numbers() {
+fn kitti_and_xyz_keep_four_numbers() {
     let written = cloud(true);
-    let (_folder, path) = write(Format::Kitti, &written);
-    let read = read_cloud(&path).unwrap();
-    assert_same(&read.x, &written.x, 0.0, "x");
-    assert_same(&read.intensity, &written.intensity, 0.0, "intensity");
-    assert_eq!((read.rows, read.columns, read.truth), (0, 0, Truth::default()));
+    for format in [Format::Kitti, Format::Xyz] {
+        let (_folder, path) = write(format, &written);
+        let read = read_cloud(&path).unwrap();
+        assert_same(&read.x, &written.x, 0.0, "x");
+        assert_same(&read.intensity, &written.intensity, 0.0, "intensity");
+        assert_eq!((read.rows, read.columns, read.truth), (0, 0, Truth::default()));
+    }
 }
 
 #[test]

@@ -245,9 +245,8 @@ impl<'a> Run<'a> {
                 "too many pixels for a picture in colour; there is the 16-bit one".to_owned(),
             );
         }
-        let is_image = |format: &Format| matches!(format, Format::Png | Format::RangeNpy);
         if !self.design.scan.has_image()
-            && scenario.formats.iter().any(is_image)
+            && scenario.formats.iter().any(|format| format.is_range_image())
             && !self.files.is_empty()
         {
             found.push(

@@ -205,6 +205,12 @@ def test_kitti(run, scan, points):
         np.testing.assert_array_equal(read[:, column], points[name])
 
 
+def test_xyz(run, scan, points):
+    read = np.loadtxt(run / f"scan-{scan:06}.xyz", np.float32)
+    for column, name in enumerate(["x", "y", "z", "intensity"]):
+        np.testing.assert_array_equal(read[:, column], points[name])
+
+
 def test_range_image(run, scan, points):
     image = np.load(run / f"range-{scan:06}.npy")
     assert image.shape == (24, 40) and image.dtype == np.dtype("<f4")

@@ -50,7 +50,7 @@ impl FileKind {
         let ending = path.extension()?.to_str()?;
         match ending.to_ascii_lowercase().as_str() {
             "ptx" => Some(Self::Ptx),
-            "xyz" | "txt" | "pts" => Some(Self::Written(Format::Csv)),
+            "pts" => Some(Self::Written(Format::Csv)),
             _ => Format::of_extension(ending).map(Self::Written),
         }
     }
@@ -181,7 +181,7 @@ impl Source {
                 return Ok(Self::Scans(Box::new(scans)));
             }
             Format::Npy => npy::parse(&mut file, room),
-            Format::Csv => csv_reader::parse(&mut file, room),
+            Format::Csv | Format::Xyz => csv_reader::parse(&mut file, room),
             Format::Kitti => kitti::parse(&mut file, kitti::Floats::of_name(path), room),
             _ => return Err(Error::unreadable(path)),
         };

@@ -2,29 +2,43 @@
 
 use super::Names;
 use super::attributes::{Attribute, Value, outcome_from_code, returns};
+use super::format::CloudWriter;
+use super::holding::Further;
 use crate::points::{NO_OBJECT, PointCloud};
 use std::borrow::Cow;
 use std::io::{self, Write};
 
-/// Writes the returns of a cloud whose columns are even. Numbers have the digits that it takes to read the
-/// same number back.
-pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
-    let attributes = &Attribute::of(cloud);
-    let header: Vec<_> = attributes.iter().map(|attribute| attribute.name_with_unit()).collect();
-    writeln!(out, "{}", header.join(","))?;
-    let mut line = String::new();
-    for point in returns(cloud) {
-        line.clear();
-        for (place, attribute) in attributes.iter().enumerate() {
-            if place > 0 {
-                line.push(',');
-            }
-            add_cell(&mut line, *attribute, attribute.value(cloud, point), names);
-        }
-        line.push('\n');
-        out.write_all(line.as_bytes())?;
+/// Comma-separated text. Numbers have the digits that it takes to read the same number back.
+pub(super) struct Csv;
+
+impl CloudWriter for Csv {
+    fn name(&self) -> &'static str {
+        "csv"
     }
-    Ok(())
+
+    fn holds_further(&self, further: Further) -> bool {
+        matches!(further, Further::Names | Further::Digits)
+    }
+
+    fn write(&self, cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let attributes = &Attribute::of(cloud);
+        let header: Vec<_> =
+            attributes.iter().map(|attribute| attribute.name_with_unit()).collect();
+        writeln!(out, "{}", header.join(","))?;
+        let mut line = String::new();
+        for point in returns(cloud) {
+            line.clear();
+            for (place, attribute) in attributes.iter().enumerate() {
+                if place > 0 {
+                    line.push(',');
+                }
+                add_cell(&mut line, *attribute, attribute.value(cloud, point), names);
+            }
+            line.push('\n');
+            out.write_all(line.as_bytes())?;
+        }
+        Ok(())
+    }
 }
 
 /// Adds the cell of a value to `line`; that of no value is empty, which is what spreadsheets take
@@ -44,7 +58,7 @@ fn add_cell(line: &mut String, attribute: Attribute, value: Value, names: &Names
     }
 }
 
-fn add_real<T: zmij::Float + Into<f64> + Copy>(line: &mut String, value: T) {
+pub(super) fn add_real<T: zmij::Float + Into<f64> + Copy>(line: &mut String, value: T) {
     let wide: f64 = value.into();
     if wide.is_finite() {
         let mut buffer = zmij::Buffer::new();
@@ -94,7 +108,7 @@ mod tests {
 
     fn lines(cloud: &PointCloud, names: &Names) -> Vec<String> {
         let mut bytes = Vec::new();
-        write(cloud, names, &mut bytes).unwrap();
+        Csv.write(cloud, names, &mut bytes).unwrap();
         String::from_utf8(bytes).unwrap().lines().map(str::to_owned).collect()
     }
 

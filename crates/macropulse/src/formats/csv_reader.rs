@@ -289,6 +289,7 @@ fn numbered(names: &mut Vec<String>, name: &str) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::format::CloudWriter;
     use super::super::{Names, csv, sample_cloud};
     use super::*;
 
@@ -301,7 +302,7 @@ mod tests {
         let cloud = sample_cloud();
         let objects = ["=car,\nred".to_owned(), "the \"road\"".to_owned()];
         let mut bytes = Vec::new();
-        csv::write(&cloud, &Names { objects: &objects, materials: &[] }, &mut bytes).unwrap();
+        csv::Csv.write(&cloud, &Names { objects: &objects, materials: &[] }, &mut bytes).unwrap();
         let (read, about) = parse(&bytes).unwrap();
         assert_eq!((read.rows, read.columns), (2, 3));
         assert_eq!((&read.range, &read.time_ns), (&cloud.range, &cloud.time_ns));

@@ -4,6 +4,8 @@
 use super::Names;
 use super::about::{list_line, name_lines, scan_line, stamp_line};
 use super::attributes::{Attribute, Value, returns};
+use super::format::CloudWriter;
+use super::holding::{Further, Holding};
 use super::number::Kind;
 use crate::points::{PointCloud, Viewpoint};
 use e57::{
@@ -20,10 +22,30 @@ const NAMESPACE_URL: &str = "urn:macropulse:attributes:1";
 /// 18 leap seconds ahead since 2017.
 pub(super) const GPS_BEHIND_S: f64 = 315_964_800.0 - 18.0;
 
-/// Writes the returns of a cloud whose columns are even.
-pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
-    let written = encode(cloud, names).map_err(io::Error::other)?;
-    out.write_all(&written)
+/// ASTM E57.
+pub(super) struct E57;
+
+impl CloudWriter for E57 {
+    fn name(&self) -> &'static str {
+        "e57"
+    }
+
+    fn holds(&self, attribute: Attribute) -> Holding {
+        match attribute {
+            Attribute::TimeNs => Holding::Partly("`timeStamp`, s"),
+            Attribute::ReturnNumber => Holding::Partly("`returnIndex`, from 0"),
+            _ => Holding::Whole,
+        }
+    }
+
+    fn holds_further(&self, further: Further) -> bool {
+        further != Further::EmptyPixels
+    }
+
+    fn write(&self, cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let written = encode(cloud, names).map_err(io::Error::other)?;
+        out.write_all(&written)
+    }
 }
 
 pub(super) fn encode(cloud: &PointCloud, names: &Names) -> e57::Result<Vec<u8>> {

@@ -1,119 +1,85 @@
-//! The formats a point cloud can be written in, and what they are called.
+//! Names and endings of the formats that a point cloud can be written in.
 
-use super::Error;
-use super::mcap::{Message, Profile};
+use super::attributes::Attribute;
+use super::holding::{Further, Holding};
+use super::{Error, Format, Names};
+use crate::points::PointCloud;
+use std::io;
 
-/// A format that a point cloud can be written in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Format {
-    /// Point Cloud Data 0.7, binary. Organised, every pixel, NaN where nothing returned; where a shot
-    /// may have several returns, a list of them.
-    Pcd,
-    /// Polygon file format, binary little endian; returns only.
-    Ply,
-    /// The same with names by which CloudCompare takes all attributes for scalar fields.
-    PlyCloudCompare,
-    /// LAS 1.4, point format 6, with extra bytes; returns only.
-    Las,
-    /// The same, compressed.
-    Laz,
-    /// ASTM E57, with attributes of ours as an extension; returns only.
-    E57,
-    /// NumPy, a structured array; returns only.
-    Npy,
-    /// Comma-separated text with units in the header; returns only.
-    Csv,
-    /// Points as the KITTI data sets have them, x, y, z and reflectance as floats; returns only.
-    Kitti,
-    /// Apache Parquet, a column for each attribute; returns only.
-    #[cfg(feature = "parquet")]
-    Parquet,
-    /// All scans of a run in one MCAP file, as messages of this kind.
-    Mcap(Message),
-    /// Range image, 16-bit grey, metres = value / 256, 0 = no return; of each pixel the return picked.
-    Png,
-    /// Range image, NumPy, rows × columns of floats in m, NaN = no return; of each pixel the return
-    /// picked.
-    RangeNpy,
+/// A format of files: its names, its contents, and the writer of one file. Each format implements it in a file of its own.
+pub(super) trait CloudWriter {
+    /// Name on the command line and in scenario files.
+    fn name(&self) -> &'static str;
+
+    /// Ending of the names of its files, after the dot. The program that opens a file goes by it, so formats may
+    /// share one.
+    fn extension(&self) -> &'static str {
+        self.name()
+    }
+
+    /// Other endings by which a file asks for this format.
+    fn other_extensions(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Name of the file with scan number `scan`, another one for every format.
+    fn file_name(&self, scan: u64) -> String {
+        format!("scan-{scan:06}.{}", self.extension())
+    }
+
+    /// Returns true if all scans of a run go into one file.
+    fn is_of_run(&self) -> bool {
+        false
+    }
+
+    /// Returns true if it has the ranges of an image of pixels, and no points.
+    fn is_range_image(&self) -> bool {
+        false
+    }
+
+    /// Says how it holds an attribute of a point.
+    fn holds(&self, _attribute: Attribute) -> Holding {
+        Holding::Whole
+    }
+
+    /// Returns true if it holds `further`, which is no attribute of a point.
+    fn holds_further(&self, further: Further) -> bool;
+
+    /// Writes a cloud whose columns are even.
+    fn write(&self, cloud: &PointCloud, names: &Names, out: &mut dyn io::Write) -> io::Result<()>;
 }
 
 impl Format {
-    /// All formats, in the order in which they are listed to people.
-    pub const ALL: &'static [Self] = &[
-        Self::Pcd,
-        Self::Ply,
-        Self::PlyCloudCompare,
-        Self::Las,
-        Self::Laz,
-        Self::E57,
-        Self::Npy,
-        Self::Csv,
-        Self::Kitti,
-        #[cfg(feature = "parquet")]
-        Self::Parquet,
-        Self::Mcap(Message::Ros2(Profile::Extended)),
-        Self::Mcap(Message::Ros2(Profile::Velodyne)),
-        Self::Mcap(Message::Ros2(Profile::Ouster)),
-        Self::Mcap(Message::Ros2(Profile::Livox)),
-        Self::Mcap(Message::Ros2(Profile::Autoware)),
-        Self::Mcap(Message::Foxglove),
-        Self::Mcap(Message::Osi),
-        Self::Png,
-        Self::RangeNpy,
-    ];
-
     /// Name on the command line and in scenario files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Pcd => "pcd",
-            Self::Ply => "ply",
-            Self::PlyCloudCompare => "ply-cloudcompare",
-            Self::Las => "las",
-            Self::Laz => "laz",
-            Self::E57 => "e57",
-            Self::Npy => "npy",
-            Self::Csv => "csv",
-            Self::Kitti => "kitti",
-            #[cfg(feature = "parquet")]
-            Self::Parquet => "parquet",
-            Self::Mcap(Message::Ros2(Profile::Extended)) => "mcap",
-            Self::Mcap(Message::Ros2(Profile::Velodyne)) => "mcap-velodyne",
-            Self::Mcap(Message::Ros2(Profile::Ouster)) => "mcap-ouster",
-            Self::Mcap(Message::Ros2(Profile::Livox)) => "mcap-livox",
-            Self::Mcap(Message::Ros2(Profile::Autoware)) => "mcap-autoware",
-            Self::Mcap(Message::Foxglove) => "mcap-foxglove",
-            Self::Mcap(Message::Osi) => "mcap-osi",
-            Self::Png => "png",
-            Self::RangeNpy => "range-npy",
-        }
+        self.writer().name()
     }
 
-    /// Returns the ending of the names of its files, after the dot. The program that opens a file goes by it,
-    /// so formats may share one.
+    /// Returns the ending of the names of its files, after the dot. Formats may share one.
     pub fn extension(self) -> &'static str {
-        match self {
-            Self::Kitti => "bin",
-            Self::PlyCloudCompare => "ply",
-            Self::Mcap(_) => "mcap",
-            Self::RangeNpy => "npy",
-            other => other.name(),
-        }
+        self.writer().extension()
+    }
+
+    /// Returns true if a file that ends in `extension`, in either case, can be one of this format.
+    pub fn has_extension(self, extension: &str) -> bool {
+        let writer = self.writer();
+        let mut all = writer.other_extensions().iter().copied().chain([writer.extension()]);
+        all.any(|known| known.eq_ignore_ascii_case(extension))
     }
 
     /// Name of the file with scan number `scan`, another one for every format.
     pub fn file_name(self, scan: u64) -> String {
-        let extension = self.extension();
-        match self {
-            Self::Png | Self::RangeNpy => format!("range-{scan:06}.{extension}"),
-            Self::PlyCloudCompare => format!("scan-{scan:06}-cloudcompare.{extension}"),
-            Self::Mcap(_) => format!("{}.{extension}", self.name().replace("mcap", "scans")),
-            _ => format!("scan-{scan:06}.{extension}"),
-        }
+        self.writer().file_name(scan)
     }
 
     /// Returns true if all scans of a run go into one file.
     pub fn is_of_run(self) -> bool {
-        matches!(self, Self::Mcap(_))
+        self.writer().is_of_run()
+    }
+
+    /// Returns true if it has the ranges of an image of pixels, and no points.
+    pub fn is_range_image(self) -> bool {
+        self.writer().is_range_image()
     }
 
     /// The format called `name`, in either case.
@@ -128,8 +94,7 @@ impl Format {
 
     /// The first format whose files end in `extension`, in either case.
     pub fn of_extension(extension: &str) -> Option<Self> {
-        let lower = extension.to_lowercase();
-        Self::ALL.iter().find(|format| format.extension() == lower).copied()
+        Self::ALL.iter().find(|format| format.has_extension(extension)).copied()
     }
 }
 
@@ -164,6 +129,7 @@ mod tests {
         assert_eq!(Format::of_extension("LAZ"), Some(Format::Laz));
         assert_eq!(Format::of_extension("npy"), Some(Format::Npy));
         assert_eq!(Format::of_extension("bin"), Some(Format::Kitti));
+        assert_eq!(Format::of_extension("txt"), Some(Format::Xyz));
         assert_eq!(Format::of_extension("docx"), None);
     }
 

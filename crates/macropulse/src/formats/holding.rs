@@ -1,9 +1,7 @@
-//! Which format holds which attribute: one table, for the notes to people and for the documentation.
+//! Contents that a format leaves out of a cloud, for the notes to people and for the table of the documentation.
 
 use super::attributes::Attribute;
-use super::kitti;
-use super::mcap::{Message, Profile, profile_holding};
-use super::{Format, Names, las};
+use super::{Format, Names};
 use crate::points::{PointCloud, Viewpoint};
 
 /// How a format holds something.
@@ -61,103 +59,24 @@ impl Further {
 impl Format {
     /// Lists, in words, the parts of `cloud` and its `names` that this format leaves out.
     pub fn leaves_out(self, cloud: &PointCloud, names: &Names) -> Vec<&'static str> {
-        let left_out = |attribute: &Attribute| self.holds(*attribute) == Holding::Not;
+        let writer = self.writer();
+        let left_out = |attribute: &Attribute| writer.holds(*attribute) == Holding::Not;
         let attributes = Attribute::of(cloud).into_iter().filter(left_out);
-        let further = Further::of(cloud, names).filter(|further| !self.holds_further(*further));
+        let further = Further::of(cloud, names).filter(|further| !writer.holds_further(*further));
         attributes.map(|attribute| attribute.name()).chain(further.map(Further::name)).collect()
     }
 
     /// Which attributes of the truth cannot be written in this format of clouds, with velocities where the sensor `shows`
     /// them; of an image of ranges none is expected.
     pub fn leaves_out_of_truth(self, shows: bool) -> Vec<&'static str> {
-        if matches!(self, Self::Png | Self::RangeNpy) {
+        if self.is_range_image() {
             return Vec::new();
         }
         let is_there =
             |attribute: &Attribute| attribute.is_true() && (shows || attribute.comes_with_truth());
         let truth = Attribute::in_files().filter(is_there);
-        let left_out = truth.filter(|attribute| self.holds(*attribute) == Holding::Not);
+        let left_out = truth.filter(|attribute| self.writer().holds(*attribute) == Holding::Not);
         left_out.map(Attribute::name).collect()
-    }
-
-    pub(super) fn holds(self, attribute: Attribute) -> Holding {
-        use Holding::{Not, Partly, Whole};
-        match self {
-            Self::Pcd | Self::Ply | Self::PlyCloudCompare | Self::Npy | Self::Csv => Whole,
-            #[cfg(feature = "parquet")]
-            Self::Parquet => Whole,
-            Self::Las | Self::Laz => match attribute {
-                Attribute::X | Attribute::Y | Attribute::Z => {
-                    Partly("steps of 1 µm, or those of the file read")
-                }
-                Attribute::TimeNs => Partly("`gps_time`, s"),
-                Attribute::ReturnNumber | Attribute::NumberOfReturns => Partly("up to 15"),
-                other if las::extra_name(other) != Some(other.name()) => {
-                    Partly("extra bytes `reflectance`; `intensity` is 10 000 × it")
-                }
-                _ => Whole,
-            },
-            Self::E57 => match attribute {
-                Attribute::TimeNs => Partly("`timeStamp`, s"),
-                Attribute::ReturnNumber => Partly("`returnIndex`, from 0"),
-                _ => Whole,
-            },
-            Self::Kitti if kitti::ATTRIBUTES.contains(&attribute) => Whole,
-            Self::Kitti => Not,
-            Self::Mcap(Message::Ros2(profile)) => profile_holding(profile, attribute),
-            Self::Mcap(Message::Foxglove) => Whole,
-            Self::Mcap(Message::Osi) => osi(attribute),
-            Self::Png => match attribute {
-                Attribute::Range => Partly("steps of 1/256 m, up to 255.99 m"),
-                Attribute::Row | Attribute::Column | Attribute::Ring => Partly("by the place"),
-                _ => Not,
-            },
-            Self::RangeNpy => match attribute {
-                Attribute::Range => Whole,
-                Attribute::Row | Attribute::Column | Attribute::Ring => Partly("by the place"),
-                _ => Not,
-            },
-        }
-    }
-
-    /// Returns true if this format holds `further`, which is no attribute of a point.
-    pub(super) fn holds_further(self, further: Further) -> bool {
-        use Further::{Digits, EmptyPixels, Names, Pose, Stamp};
-        match self {
-            Self::Pcd => true,
-            Self::Ply | Self::PlyCloudCompare | Self::Las | Self::Laz | Self::E57 => {
-                further != EmptyPixels
-            }
-            #[cfg(feature = "parquet")]
-            Self::Parquet => further != EmptyPixels,
-            Self::Npy => further == Digits,
-            Self::Kitti => false,
-            Self::Csv => matches!(further, Names | Digits),
-            Self::Mcap(Message::Ros2(profile)) => match further {
-                EmptyPixels => profile.is_organised(),
-                Pose | Names | Stamp => true,
-                Digits => profile == Profile::Extended,
-            },
-            Self::Mcap(Message::Foxglove) => further != EmptyPixels,
-            Self::Mcap(Message::Osi) => matches!(further, Names | Stamp | Digits),
-            // Images have no coordinates.
-            Self::Png | Self::RangeNpy => matches!(further, EmptyPixels | Digits),
-        }
-    }
-}
-
-fn osi(attribute: Attribute) -> Holding {
-    use Holding::{Not, Partly, Whole};
-    match attribute {
-        Attribute::X | Attribute::Y | Attribute::Z => Partly("as distance, azimuth, elevation"),
-        Attribute::Intensity => Partly("`reflectivity`; `intensity` in percent"),
-        Attribute::Range | Attribute::RadialVelocity => Whole,
-        Attribute::Row | Attribute::Ring => Partly("`beam_id`"),
-        Attribute::TimeNs => Partly("of the scan alone"),
-        Attribute::TrueRange => Partly("`time_of_flight` of a reflection"),
-        Attribute::Object => Partly("`object_id`"),
-        Attribute::Outcome => Partly("`classification`: right, near and edge, wrong, false"),
-        _ => Not,
     }
 }
 
@@ -167,35 +86,41 @@ mod tests {
     use super::*;
     use crate::points::Truth;
 
+    /// Formats of points that hold the same, side by side in [`Format::ALL`], share a column of the documentation.
+    fn columns() -> Vec<(String, Format)> {
+        let mut columns: Vec<(String, Format)> = Vec::new();
+        for format in Format::ALL.iter().copied().filter(|format| !format.is_range_image()) {
+            let name = format.name().strip_prefix("mcap").filter(|rest| !rest.is_empty());
+            let name = name.unwrap_or(format.name());
+            match columns.last_mut() {
+                Some((names, last)) if holds_same(*last, format) => *names += &format!(", {name}"),
+                _ => columns.push((name.to_owned(), format)),
+            }
+        }
+        columns
+    }
+
+    fn holds_same(one: Format, other: Format) -> bool {
+        let (one, other) = (one.writer(), other.writer());
+        let same = |attribute| one.holds(attribute) == other.holds(attribute);
+        Attribute::in_files().all(same)
+            && Further::ALL
+                .iter()
+                .all(|further| one.holds_further(*further) == other.holds_further(*further))
+    }
+
     /// The table of docs/formats.md: a row for each attribute and for what else there is, a column
     /// for each group of formats.
     fn table() -> String {
-        let columns = [
-            ("pcd", Format::Pcd),
-            ("ply (both)", Format::Ply),
-            ("las, laz", Format::Las),
-            ("e57", Format::E57),
-            ("npy", Format::Npy),
-            ("csv", Format::Csv),
-            ("kitti", Format::Kitti),
-            #[cfg(feature = "parquet")]
-            ("parquet", Format::Parquet),
-            ("mcap", Format::Mcap(Message::Ros2(Profile::Extended))),
-            ("-velodyne", Format::Mcap(Message::Ros2(Profile::Velodyne))),
-            ("-ouster", Format::Mcap(Message::Ros2(Profile::Ouster))),
-            ("-livox", Format::Mcap(Message::Ros2(Profile::Livox))),
-            ("-autoware", Format::Mcap(Message::Ros2(Profile::Autoware))),
-            ("-foxglove", Format::Mcap(Message::Foxglove)),
-            ("-osi", Format::Mcap(Message::Osi)),
-        ];
+        let columns = columns();
         let mut text = "|".to_owned();
         columns.iter().for_each(|(name, _)| text += &format!(" | {name}"));
         text += &format!(" |\n|---{}|\n", "|---".repeat(columns.len()));
         let mut remarks: Vec<&str> = Vec::new();
         for attribute in Attribute::in_files() {
             text += &format!("| `{}`", attribute.name());
-            for (_, format) in columns {
-                text += &match format.holds(attribute) {
+            for (_, format) in &columns {
+                text += &match format.writer().holds(attribute) {
                     Holding::Whole => " | ●".to_owned(),
                     Holding::Not => " | –".to_owned(),
                     Holding::Partly(how) => {
@@ -212,8 +137,8 @@ mod tests {
         }
         for further in Further::ALL {
             text += &format!("| {}", further.name());
-            for (_, format) in columns {
-                text += if format.holds_further(further) { " | ●" } else { " | –" };
+            for (_, format) in &columns {
+                text += if format.writer().holds_further(further) { " | ●" } else { " | –" };
             }
             text += " |\n";
         }

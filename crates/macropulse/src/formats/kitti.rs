@@ -2,9 +2,12 @@
 //! sets have them, or these and the ring, as nuScenes has them.
 
 use super::CloudRoom;
+use super::Names;
 use super::about::About;
 use super::attributes::{Attribute, Value, returns};
 use super::cloud_file::CloudFile;
+use super::format::CloudWriter;
+use super::holding::{Further, Holding};
 use super::number::Kind;
 use super::table::{self, Layout};
 use crate::points::PointCloud;
@@ -15,22 +18,42 @@ use std::path::Path;
 pub(super) const ATTRIBUTES: [Attribute; 4] =
     [Attribute::X, Attribute::Y, Attribute::Z, Attribute::Intensity];
 
-/// Writes the returns of a cloud whose columns are even.
-pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
-    let has = Attribute::of(cloud);
-    let value = |attribute: Attribute, point| match has.contains(&attribute) {
-        true => attribute.value(cloud, point),
-        // Each point has room for a reflectance.
-        false => Value::F4(f32::NAN),
-    };
-    let mut bytes = Vec::with_capacity(16);
-    for point in returns(cloud) {
-        bytes.clear();
-        let values = ATTRIBUTES.map(|attribute| value(attribute, point));
-        values.into_iter().for_each(|value| value.narrowed().append_to(&mut bytes));
-        out.write_all(&bytes)?;
+/// Points as the KITTI data sets have them.
+pub(super) struct Kitti;
+
+impl CloudWriter for Kitti {
+    fn name(&self) -> &'static str {
+        "kitti"
     }
-    Ok(())
+
+    fn extension(&self) -> &'static str {
+        "bin"
+    }
+
+    fn holds(&self, attribute: Attribute) -> Holding {
+        if ATTRIBUTES.contains(&attribute) { Holding::Whole } else { Holding::Not }
+    }
+
+    fn holds_further(&self, _further: Further) -> bool {
+        false
+    }
+
+    fn write(&self, cloud: &PointCloud, _names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let has = Attribute::of(cloud);
+        let value = |attribute: Attribute, point| match has.contains(&attribute) {
+            true => attribute.value(cloud, point),
+            // Each point has room for a reflectance.
+            false => Value::F4(f32::NAN),
+        };
+        let mut bytes = Vec::with_capacity(16);
+        for point in returns(cloud) {
+            bytes.clear();
+            let values = ATTRIBUTES.map(|attribute| value(attribute, point));
+            values.into_iter().for_each(|value| value.narrowed().append_to(&mut bytes));
+            out.write_all(&bytes)?;
+        }
+        Ok(())
+    }
 }
 
 /// How many floats a point has.
@@ -150,7 +173,7 @@ mod tests {
     fn four_floats_are_a_point() {
         let cloud = sample_cloud();
         let mut bytes = Vec::new();
-        write(&cloud, &mut bytes).unwrap();
+        Kitti.write(&cloud, &Names::default(), &mut bytes).unwrap();
         assert_eq!(bytes.len(), 5 * 16);
         let (read, _) = parse(&bytes, Floats::Four).unwrap();
         assert_eq!((&read.x, &read.y, &read.z), (&cloud.x, &cloud.y, &cloud.z));
@@ -177,7 +200,7 @@ mod tests {
             );
         }
         let mut four = Vec::new();
-        write(&sample_cloud(), &mut four).unwrap();
+        Kitti.write(&sample_cloud(), &Names::default(), &mut four).unwrap();
         assert_eq!(parse(&four, Floats::Five).unwrap().0.returns(), 5);
         // Floats that could be either are what the name says.
         let either = floats(&[1.0; 20]);

@@ -3,6 +3,8 @@
 use super::Names;
 use super::about::all_lines;
 use super::attributes::{Attribute, returns};
+use super::format::CloudWriter;
+use super::holding::{Further, Holding};
 use super::number::Kind;
 use crate::points::PointCloud;
 use las::{Builder, Point, Transform, Vector, Version, Vlr, Writer};
@@ -56,26 +58,56 @@ pub(super) fn extra_name(attribute: Attribute) -> Option<&'static str> {
     }
 }
 
-/// Writes the returns of a cloud whose columns are even.
-pub(super) fn write(
-    cloud: &PointCloud,
-    names: &Names,
-    compress: bool,
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    let extra: Vec<Attribute> = Attribute::of(cloud)
-        .into_iter()
-        .filter(|attribute| extra_name(*attribute).is_some())
-        .collect();
-    let header = builder(cloud, names, &extra, compress)?.into_header();
-    let mut writer = Writer::new(Cursor::new(Vec::new()), header.map_err(io::Error::other)?)
-        .map_err(io::Error::other)?;
-    for (at, point) in returns(cloud).enumerate() {
-        let mut bytes = Vec::new();
-        extra.iter().for_each(|attribute| attribute.value(cloud, point).append_to(&mut bytes));
-        writer.write_point(point_of(cloud, at, bytes)).map_err(io::Error::other)?;
+/// LAS 1.4, point format 6.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Compression {
+    /// Plain records.
+    None,
+    /// Compressed records: LAZ.
+    Laz,
+}
+
+impl CloudWriter for Compression {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::None => "las",
+            Self::Laz => "laz",
+        }
     }
-    out.write_all(writer.into_inner().map_err(io::Error::other)?.get_ref())
+
+    fn holds(&self, attribute: Attribute) -> Holding {
+        match attribute {
+            Attribute::X | Attribute::Y | Attribute::Z => {
+                Holding::Partly("steps of 1 µm, or those of the file read")
+            }
+            Attribute::TimeNs => Holding::Partly("`gps_time`, s"),
+            Attribute::ReturnNumber | Attribute::NumberOfReturns => Holding::Partly("up to 15"),
+            other if extra_name(other) != Some(other.name()) => {
+                Holding::Partly("extra bytes `reflectance`; `intensity` is 10 000 × it")
+            }
+            _ => Holding::Whole,
+        }
+    }
+
+    fn holds_further(&self, further: Further) -> bool {
+        further != Further::EmptyPixels
+    }
+
+    fn write(&self, cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let extra: Vec<Attribute> = Attribute::of(cloud)
+            .into_iter()
+            .filter(|attribute| extra_name(*attribute).is_some())
+            .collect();
+        let header = builder(cloud, names, &extra, *self == Self::Laz)?.into_header();
+        let mut writer = Writer::new(Cursor::new(Vec::new()), header.map_err(io::Error::other)?)
+            .map_err(io::Error::other)?;
+        for (at, point) in returns(cloud).enumerate() {
+            let mut bytes = Vec::new();
+            extra.iter().for_each(|attribute| attribute.value(cloud, point).append_to(&mut bytes));
+            writer.write_point(point_of(cloud, at, bytes)).map_err(io::Error::other)?;
+        }
+        out.write_all(writer.into_inner().map_err(io::Error::other)?.get_ref())
+    }
 }
 
 fn builder(
@@ -224,13 +256,13 @@ mod tests {
     #[test]
     fn las_files_begin_with_their_magic_and_laz_is_smaller() {
         let cloud = PointCloud { returns_per_shot: 1, ..sample_cloud() };
-        let written = |compress| {
+        let written = |compression: Compression| {
             let mut bytes = Vec::new();
-            write(&cloud, &Names::default(), compress, &mut bytes).unwrap();
+            compression.write(&cloud, &Names::default(), &mut bytes).unwrap();
             assert_eq!(&bytes[..4], b"LASF");
             bytes
         };
-        let [las, laz] = [false, true].map(written);
+        let [las, laz] = [Compression::None, Compression::Laz].map(written);
         assert_eq!((las[24], las[25], las[104] & 63), (1, 4, 6));
         assert_eq!(laz[104] & 128, 128);
     }

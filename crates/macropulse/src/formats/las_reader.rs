@@ -350,6 +350,7 @@ fn record(point: &Point, extra: &[Extra], at: usize) -> Result<Record, String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::format::CloudWriter;
     use super::super::las as writer;
     use super::super::{Names, sample_cloud};
     use super::*;
@@ -359,17 +360,17 @@ mod tests {
         super::parse(CloudFile::of_bytes(&bytes), CloudRoom::default())
     }
 
-    fn written(compress: bool) -> Vec<u8> {
+    fn written(compression: writer::Compression) -> Vec<u8> {
         let mut bytes = Vec::new();
-        writer::write(&sample_cloud(), &Names::default(), compress, &mut bytes).unwrap();
+        compression.write(&sample_cloud(), &Names::default(), &mut bytes).unwrap();
         bytes
     }
 
     #[test]
     fn what_was_written_is_read() {
         let cloud = sample_cloud();
-        for compress in [false, true] {
-            let (read, about) = parse(written(compress)).unwrap();
+        for compression in [writer::Compression::None, writer::Compression::Laz] {
+            let (read, about) = parse(written(compression)).unwrap();
             assert_eq!((read.scan, read.rows, read.columns), (3, 2, 3));
             assert_eq!(about.viewpoint, cloud.viewpoint);
             assert_eq!((&read.range, &read.intensity), (&cloud.range, &cloud.intensity));
@@ -411,7 +412,7 @@ mod tests {
         assert!(cloud.intensity.is_empty() && cloud.time_ns.is_empty());
         assert!(cloud.return_number.is_empty() && about.left_out.is_empty());
         let mut bytes = Vec::new();
-        writer::write(&cloud, &Names::default(), true, &mut bytes).unwrap();
+        writer::Compression::Laz.write(&cloud, &Names::default(), &mut bytes).unwrap();
         let (again, _) = parse(bytes).unwrap();
         for (found, written) in again.position(0).into_iter().zip(far) {
             assert!((found - written).abs() < 1e-9, "{found} {written}");
@@ -444,7 +445,7 @@ mod tests {
 
     #[test]
     fn points_compressed_in_one_piece_are_named_as_such() {
-        let mut laz = written(true);
+        let mut laz = written(writer::Compression::Laz);
         let name = b"laszip encoded";
         let at = laz.windows(name.len()).position(|window| window == name).unwrap();
         // Behind the name of 16 bytes its number, its length and a description of 32.
@@ -466,24 +467,24 @@ mod tests {
 
     #[test]
     fn a_file_cut_short_is_refused() {
-        let las = written(false);
+        let las = written(writer::Compression::None);
         let told = parse(las[..las.len() - 1].to_vec()).unwrap_err();
         assert!(told.contains("ends after 4 of 5 points"), "{told}");
         assert!(parse(las[..100].to_vec()).unwrap_err().contains("cut short"));
-        let laz = written(true);
+        let laz = written(writer::Compression::Laz);
         assert!(parse(laz[..laz.len() - 40].to_vec()).is_err());
         assert_eq!(parse(b"ply\n".to_vec()).unwrap_err(), "it does not begin with LASF");
     }
 
     #[test]
     fn absurd_sizes_are_refused_not_allocated() {
-        let mut las = written(false);
+        let mut las = written(writer::Compression::None);
         las[247..255].copy_from_slice(&u64::MAX.to_le_bytes());
         assert!(parse(las).unwrap_err().contains("points"));
-        let mut las = written(false);
+        let mut las = written(writer::Compression::None);
         las[96..100].copy_from_slice(&u32::MAX.to_le_bytes());
         assert!(parse(las).unwrap_err().contains("cut short"));
-        let mut las = written(false);
+        let mut las = written(writer::Compression::None);
         las[235..243].copy_from_slice(&100_u64.to_le_bytes());
         las[243..247].copy_from_slice(&u32::MAX.to_le_bytes());
         assert!(parse(las).unwrap_err().contains("beyond the file"));

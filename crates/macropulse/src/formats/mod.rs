@@ -38,14 +38,16 @@ mod png16;
 mod ptx_reader;
 mod recording;
 mod room;
+#[cfg(test)]
+mod sample;
 mod table;
+mod xyz;
 
 pub use atomic::{WholeFile, clear_unfinished, prove_writable, write_atomically, write_named};
 pub use clouds::{Clouds, Reading, read_cloud, read_pcd};
 pub use contained::is_contained;
 pub use csv::quoted;
 pub use error::Error;
-pub use format::Format;
 pub use left_out::{LeftOut, NoPoint};
 pub use manifest::{
     Begun, Entries, Manifest, Named, SCHEMA_VERSION, State, Surroundings, versioned, write_manifest,
@@ -57,7 +59,94 @@ pub use recording::Recording;
 pub use room::CloudRoom;
 
 use crate::points::PointCloud;
+use format::CloudWriter;
+#[cfg(test)]
+use sample::sample_cloud;
 use std::path::Path;
+
+/// A format that a point cloud can be written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// Point Cloud Data 0.7, binary. Organised, every pixel, NaN where nothing returned; where a shot
+    /// may have several returns, a list of them.
+    Pcd,
+    /// Polygon file format, binary little endian; returns only.
+    Ply,
+    /// The same with names by which CloudCompare takes all attributes for scalar fields.
+    PlyCloudCompare,
+    /// LAS 1.4, point format 6, with extra bytes; returns only.
+    Las,
+    /// The same, compressed.
+    Laz,
+    /// ASTM E57, with attributes of ours as an extension; returns only.
+    E57,
+    /// NumPy, a structured array; returns only.
+    Npy,
+    /// Comma-separated text with units in the header; returns only.
+    Csv,
+    /// Text without a header: x, y, z and intensity of a return, with blanks between them.
+    Xyz,
+    /// Points as the KITTI data sets have them, x, y, z and reflectance as floats; returns only.
+    Kitti,
+    /// Apache Parquet, a column for each attribute; returns only.
+    #[cfg(feature = "parquet")]
+    Parquet,
+    /// All scans of a run in one MCAP file, as messages of this kind.
+    Mcap(Message),
+    /// Range image, 16-bit grey, metres = value / 256, 0 = no return; of each pixel the return picked.
+    Png,
+    /// Range image, NumPy, rows × columns of floats in m, NaN = no return; of each pixel the return
+    /// picked.
+    RangeNpy,
+}
+
+impl Format {
+    /// All formats, in the order in which they are listed to people.
+    pub const ALL: &'static [Self] = &[
+        Self::Pcd,
+        Self::Ply,
+        Self::PlyCloudCompare,
+        Self::Las,
+        Self::Laz,
+        Self::E57,
+        Self::Npy,
+        Self::Csv,
+        Self::Xyz,
+        Self::Kitti,
+        #[cfg(feature = "parquet")]
+        Self::Parquet,
+        Self::Mcap(Message::Ros2(Profile::Extended)),
+        Self::Mcap(Message::Ros2(Profile::Velodyne)),
+        Self::Mcap(Message::Ros2(Profile::Ouster)),
+        Self::Mcap(Message::Ros2(Profile::Livox)),
+        Self::Mcap(Message::Ros2(Profile::Autoware)),
+        Self::Mcap(Message::Foxglove),
+        Self::Mcap(Message::Osi),
+        Self::Png,
+        Self::RangeNpy,
+    ];
+
+    /// The writer of its files.
+    fn writer(&self) -> &dyn CloudWriter {
+        match self {
+            Self::Pcd => &pcd::Pcd,
+            Self::Ply => &ply::PropertyNames::Plain,
+            Self::PlyCloudCompare => &ply::PropertyNames::CloudCompare,
+            Self::Las => &las::Compression::None,
+            Self::Laz => &las::Compression::Laz,
+            Self::E57 => &e57::E57,
+            Self::Npy => &npy::Npy,
+            Self::Csv => &csv::Csv,
+            Self::Xyz => &xyz::Xyz,
+            Self::Kitti => &kitti::Kitti,
+            #[cfg(feature = "parquet")]
+            Self::Parquet => &parquet::Parquet,
+            Self::Mcap(message) => message,
+            Self::Png => &png16::Png,
+            Self::RangeNpy => &npy::RangeNpy,
+        }
+    }
+}
 
 /// Names of the object and material numbers of a scene. Numbers without a name are written as numbers.
 #[derive(Debug, Clone, Copy, Default)]
@@ -82,31 +171,7 @@ pub fn write_cloud(
     path: &Path,
 ) -> Result<(), Error> {
     attributes::check_even(cloud)?;
-    write_named(path, |out| write_even(format, (cloud, names), out))
-}
-
-/// Writes a cloud whose columns are even.
-fn write_even(
-    format: Format,
-    (cloud, names): (&PointCloud, &Names),
-    out: &mut dyn std::io::Write,
-) -> std::io::Result<()> {
-    match format {
-        Format::Pcd => pcd::write(cloud, names, out),
-        Format::Ply => ply::write(cloud, names, ply::Called::AsTheyAre, out),
-        Format::PlyCloudCompare => ply::write(cloud, names, ply::Called::Scalars, out),
-        Format::Las => las::write(cloud, names, false, out),
-        Format::Laz => las::write(cloud, names, true, out),
-        Format::E57 => e57::write(cloud, names, out),
-        Format::Npy => npy::write(cloud, out),
-        Format::Csv => csv::write(cloud, names, out),
-        Format::Kitti => kitti::write(cloud, out),
-        #[cfg(feature = "parquet")]
-        Format::Parquet => parquet::write(cloud, names, out),
-        Format::Mcap(message) => mcap::write(message, cloud, names, out),
-        Format::Png => png16::write(cloud, out),
-        Format::RangeNpy => npy::write_range(cloud, out),
-    }
+    write_named(path, |out| format.writer().write(cloud, names, out))
 }
 
 /// Writes the returns of `cloud` as lines of [`Format::Csv`], for a stream of parts: only the first part has
@@ -120,72 +185,9 @@ pub fn write_csv_lines(
     out: &mut dyn std::io::Write,
 ) -> std::io::Result<()> {
     let mut lines = Vec::new();
-    csv::write(cloud, &Names::default(), &mut lines)?;
+    csv::Csv.write(cloud, &Names::default(), &mut lines)?;
     let behind = lines.iter().position(|byte| *byte == b'\n').map_or(0, |end| end + 1);
     out.write_all(if is_first { &lines } else { &lines[behind..] })
-}
-
-/// A cloud of 2 × 3 pixels, one of them empty, for the tests of all formats.
-#[cfg(test)]
-fn sample_cloud() -> PointCloud {
-    use crate::points::{NO_OBJECT, Outcome, Pick, Surfaces, Truth, Viewpoint};
-    let nan = f32::NAN;
-    let fired_ns = vec![0.0, 40.946_5, 81.893, 122.84, 163.786, 204.732_5];
-    PointCloud {
-        scan: 3,
-        rows: 2,
-        columns: 3,
-        viewpoint: Viewpoint { position: [1.5, -2.0, 0.25], turn: [0.6, 0.0, 0.0, -0.8] },
-        returns_per_shot: 1,
-        pick: Pick::Strongest,
-        row: vec![0, 0, 1, 1, 1],
-        column: vec![0, 1, 0, 1, 2],
-        return_number: vec![1; 5],
-        number_of_returns: vec![1; 5],
-        x: vec![30.0, 30.5, 29.0, 31.25, 28.0],
-        y: vec![1.0, 0.0, 1.5, 0.25, -1.0],
-        z: vec![0.5, 0.5, -0.5, -0.25, -0.75],
-        intensity: vec![0.8, 0.1, 0.3, 1.0, 0.0],
-        range: vec![30.02, 30.5, 29.04, 31.26, 28.03],
-        time_ns: [0, 1, 3, 4, 5].map(|pixel| fired_ns[pixel]).to_vec(),
-        peak: vec![174, 170, 60, 174, 58],
-        marks: vec![174, 174, 174, 174, 58],
-        margin: vec![80, 70, 3, 81, 20],
-        photons: vec![nan; 5],
-        saturated: vec![false; 5],
-        fired_ns,
-        truth: Truth {
-            returns: Surfaces {
-                range: vec![30.02, 30.5, 40.0, 31.26, nan],
-                object: vec![0, 0, 1, 0, NO_OBJECT],
-                material: vec![1, 0, 2, 0, NO_OBJECT],
-                cosine: vec![1.0, 0.5, 0.0, 0.999_999_9, nan],
-                outcome: vec![
-                    Outcome::Right,
-                    Outcome::Near,
-                    Outcome::Wrong,
-                    Outcome::Right,
-                    Outcome::False,
-                ],
-            },
-            pixels: Surfaces {
-                range: vec![30.02, 30.5, nan, 40.0, 31.26, nan],
-                object: vec![0, 0, NO_OBJECT, 1, 0, NO_OBJECT],
-                material: vec![1, 0, NO_OBJECT, 2, 0, NO_OBJECT],
-                cosine: vec![1.0, 0.5, nan, 0.0, 0.999_999_9, nan],
-                outcome: vec![
-                    Outcome::Right,
-                    Outcome::Near,
-                    Outcome::Empty,
-                    Outcome::Wrong,
-                    Outcome::Right,
-                    Outcome::False,
-                ],
-            },
-            ..Truth::default()
-        },
-        ..PointCloud::default()
-    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,11 @@
 //! NumPy's `.npy` 1.0: the returns as a structured array, and range images.
 
+use super::Names;
 use super::about::About;
 use super::attributes::{Attribute, returns};
 use super::cloud_file::{CloudFile, LONGEST_HEADER};
+use super::format::CloudWriter;
+use super::holding::{Further, Holding};
 use super::number::Kind;
 use super::table::{self, Layout};
 use super::{CloudRoom, interleave};
@@ -12,36 +15,80 @@ use std::io::{self, Write};
 /// Bytes at the beginning of every file, before the version.
 const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Writes the returns of a cloud whose columns are even, as one structured array.
-pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
-    let attributes = Attribute::of(cloud);
-    let fields: Vec<String> = attributes
-        .iter()
-        .map(|attribute| format!("('{}', '{}')", attribute.name(), descr(*attribute, cloud)))
-        .collect();
-    write_header(&format!("[{}]", fields.join(", ")), &format!("({},)", cloud.returns()), out)?;
-    let mut bytes = Vec::new();
-    for point in returns(cloud) {
-        bytes.clear();
-        for attribute in &attributes {
-            attribute.value(cloud, point).append_to(&mut bytes);
-        }
-        out.write_all(&bytes)?;
+/// The returns as one structured array.
+pub(super) struct Npy;
+
+impl CloudWriter for Npy {
+    fn name(&self) -> &'static str {
+        "npy"
     }
-    Ok(())
+
+    fn holds_further(&self, further: Further) -> bool {
+        further == Further::Digits
+    }
+
+    fn write(&self, cloud: &PointCloud, _names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let attributes = Attribute::of(cloud);
+        let fields: Vec<String> = attributes
+            .iter()
+            .map(|attribute| format!("('{}', '{}')", attribute.name(), descr(*attribute, cloud)))
+            .collect();
+        write_header(&format!("[{}]", fields.join(", ")), &format!("({},)", cloud.returns()), out)?;
+        let mut bytes = Vec::new();
+        for point in returns(cloud) {
+            bytes.clear();
+            for attribute in &attributes {
+                attribute.value(cloud, point).append_to(&mut bytes);
+            }
+            out.write_all(&bytes)?;
+        }
+        Ok(())
+    }
 }
 
-/// Writes the range image of a cloud whose columns are even: rows × columns, m. A pixel has the range of its
-/// picked return, or NaN if it has no return.
-pub(super) fn write_range(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
-    if cloud.rows * cloud.columns == 0 {
-        return Err(io::Error::other("an image needs at least one row and one column"));
+/// The range image: rows × columns, m. A pixel has the range of its picked return, or NaN if it has no return.
+pub(super) struct RangeNpy;
+
+impl CloudWriter for RangeNpy {
+    fn name(&self) -> &'static str {
+        "range-npy"
     }
-    write_header("'<f4'", &format!("({}, {})", cloud.rows, cloud.columns), out)?;
-    for range in cloud.image(cloud.pick).spread(&cloud.distances(), f32::NAN) {
-        out.write_all(&range.to_le_bytes())?;
+
+    fn extension(&self) -> &'static str {
+        "npy"
     }
-    Ok(())
+
+    fn file_name(&self, scan: u64) -> String {
+        format!("range-{scan:06}.npy")
+    }
+
+    fn is_range_image(&self) -> bool {
+        true
+    }
+
+    fn holds(&self, attribute: Attribute) -> Holding {
+        match attribute {
+            Attribute::Range => Holding::Whole,
+            Attribute::Row | Attribute::Column | Attribute::Ring => Holding::Partly("by the place"),
+            _ => Holding::Not,
+        }
+    }
+
+    // Images have no coordinates.
+    fn holds_further(&self, further: Further) -> bool {
+        matches!(further, Further::EmptyPixels | Further::Digits)
+    }
+
+    fn write(&self, cloud: &PointCloud, _names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        if cloud.rows * cloud.columns == 0 {
+            return Err(io::Error::other("an image needs at least one row and one column"));
+        }
+        write_header("'<f4'", &format!("({}, {})", cloud.rows, cloud.columns), out)?;
+        for range in cloud.image(cloud.pick).spread(&cloud.distances(), f32::NAN) {
+            out.write_all(&range.to_le_bytes())?;
+        }
+        Ok(())
+    }
 }
 
 fn descr(attribute: Attribute, cloud: &PointCloud) -> String {
@@ -225,7 +272,7 @@ mod tests {
     fn the_header_is_as_numpy_writes_it() {
         let cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
         let mut bytes = Vec::new();
-        write(&cloud, &mut bytes).unwrap();
+        Npy.write(&cloud, &Names::default(), &mut bytes).unwrap();
         let end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
         assert_eq!(end % 64, 0);
         let header = std::str::from_utf8(&bytes[10..end]).unwrap();
@@ -239,7 +286,7 @@ mod tests {
     #[test]
     fn a_range_image_has_its_rows_and_columns() {
         let mut bytes = Vec::new();
-        write_range(&sample_cloud(), &mut bytes).unwrap();
+        RangeNpy.write(&sample_cloud(), &Names::default(), &mut bytes).unwrap();
         let image = &bytes[bytes.len() - 6 * 4..];
         let at = |place: usize| f32::from_le_bytes(image[4 * place..][..4].try_into().unwrap());
         assert!(at(0) == 30.02 && at(2).is_nan() && at(5) == 28.03);
@@ -252,10 +299,10 @@ mod tests {
         assert_eq!(fault(b"PK"), "it does not begin as NumPy files do");
         let mut image = Vec::new();
         let three = PointCloud { rows: 3, columns: 2, ..sample_cloud() };
-        write_range(&three, &mut image).unwrap();
+        RangeNpy.write(&three, &Names::default(), &mut image).unwrap();
         assert!(fault(&image).starts_with("its shape is 3 × 2; arrays of N × 3 (x, y, z)"));
         let mut bytes = Vec::new();
-        write(&sample_cloud(), &mut bytes).unwrap();
+        Npy.write(&sample_cloud(), &Names::default(), &mut bytes).unwrap();
         assert!(fault(&bytes[..40]).contains("ends within its header"));
         assert!(fault(&bytes[..bytes.len() - 1]).contains("ends after 4 of 5 points"));
         let complex = array("[('x', '<c8')]", "False", "(0,)", []);

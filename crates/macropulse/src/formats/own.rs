@@ -111,7 +111,8 @@ mod tests {
     #[test]
     fn file_of_every_format_is_known_beside_its_manifest_and_marked_ones_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let unmarked = [Format::Npy, Format::Csv, Format::Kitti, Format::Png, Format::RangeNpy];
+        let unmarked =
+            [Format::Npy, Format::Csv, Format::Xyz, Format::Kitti, Format::Png, Format::RangeNpy];
         let path = |format: &Format| folder.path().join(format.file_name(7));
         for &format in Format::ALL {
             write_cloud(format, &sample_cloud(), &Names::default(), &path(&format)).unwrap();

@@ -3,6 +3,8 @@
 use super::Names;
 use super::about::all_lines;
 use super::attributes::{Attribute, Value, returns};
+use super::format::CloudWriter;
+use super::holding::Further;
 use super::number::Kind;
 use crate::points::PointCloud;
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
@@ -18,10 +20,22 @@ use std::sync::Arc;
 /// Key of the text with scan, image, pose and names.
 const KEY: &str = "macropulse";
 
-/// Writes the returns of a cloud whose columns are even.
-pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
-    let written = encode(cloud, names).map_err(io::Error::other)?;
-    out.write_all(&written)
+/// Apache Parquet.
+pub(super) struct Parquet;
+
+impl CloudWriter for Parquet {
+    fn name(&self) -> &'static str {
+        "parquet"
+    }
+
+    fn holds_further(&self, further: Further) -> bool {
+        further != Further::EmptyPixels
+    }
+
+    fn write(&self, cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let written = encode(cloud, names).map_err(io::Error::other)?;
+        out.write_all(&written)
+    }
 }
 
 fn encode(cloud: &PointCloud, names: &Names) -> Result<Vec<u8>> {

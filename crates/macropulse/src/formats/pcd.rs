@@ -3,25 +3,39 @@
 use super::Names;
 use super::about::{list_line, name_lines, scan_line, stamp_line, viewpoint_text};
 use super::attributes::{Attribute, pixels, returns};
+use super::format::CloudWriter;
+use super::holding::Further;
 use crate::points::PointCloud;
 use std::io::{self, Write};
 
-/// Writes a cloud whose columns are even. If a shot has one return at most, the file has every pixel: `WIDTH`
+/// Point Cloud Data 0.7, binary. If a shot has one return at most, the file has every pixel: `WIDTH`
 /// is the number of columns, `HEIGHT` the number of rows. A pixel without a return is NaN, never 0. If a shot
 /// may have several returns, or the cloud has no pixels, the file has the returns as a list: `HEIGHT` is 1.
-pub(super) fn write(cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
-    let attributes = Attribute::of(cloud);
-    write_header(cloud, &attributes, names, out)?;
-    let mut bytes = Vec::new();
-    let points = if is_list(cloud) { returns(cloud).collect() } else { pixels(cloud) };
-    for point in points {
-        bytes.clear();
-        for attribute in &attributes {
-            attribute.value(cloud, point).append_to(&mut bytes);
-        }
-        out.write_all(&bytes)?;
+pub(super) struct Pcd;
+
+impl CloudWriter for Pcd {
+    fn name(&self) -> &'static str {
+        "pcd"
     }
-    Ok(())
+
+    fn holds_further(&self, _further: Further) -> bool {
+        true
+    }
+
+    fn write(&self, cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let attributes = Attribute::of(cloud);
+        write_header(cloud, &attributes, names, out)?;
+        let mut bytes = Vec::new();
+        let points = if is_list(cloud) { returns(cloud).collect() } else { pixels(cloud) };
+        for point in points {
+            bytes.clear();
+            for attribute in &attributes {
+                attribute.value(cloud, point).append_to(&mut bytes);
+            }
+            out.write_all(&bytes)?;
+        }
+        Ok(())
+    }
 }
 
 /// Returns true if the points are a list and no image.
@@ -105,7 +119,7 @@ mod tests {
         assert!(text.contains("# macropulse list 2 3 2 strongest\n"), "{text}");
         assert!(text.contains("WIDTH 5\nHEIGHT 1\n"), "{text}");
         let mut bytes = Vec::new();
-        write(&cloud, &Names::default(), &mut bytes).unwrap();
+        Pcd.write(&cloud, &Names::default(), &mut bytes).unwrap();
         assert_eq!((bytes.len() - text.len()) % 5, 0);
     }
 
@@ -113,7 +127,7 @@ mod tests {
     fn every_pixel_is_written_the_empty_one_as_nan() {
         let cloud = PointCloud { truth: Truth::default(), ..sample_cloud() };
         let mut bytes = Vec::new();
-        write(&cloud, &Names::default(), &mut bytes).unwrap();
+        Pcd.write(&cloud, &Names::default(), &mut bytes).unwrap();
         let body = &bytes[header(&cloud, &Names::default()).len()..];
         let stride = 5 * 4 + 8 + 6 * 2 + 3;
         assert_eq!(body.len(), 6 * stride);

@@ -7,6 +7,8 @@
 use super::Names;
 use super::about::all_lines;
 use super::attributes::{Attribute, Value, returns};
+use super::format::CloudWriter;
+use super::holding::Further;
 use super::number::Kind;
 use crate::points::PointCloud;
 use std::io::{self, Write};
@@ -15,56 +17,75 @@ use std::io::{self, Write};
 /// name there.
 pub(super) const SCALAR: &str = "scalar_";
 
-/// How properties are called.
+/// Names of the properties of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Called {
-    /// As the attributes.
-    AsTheyAre,
-    /// With [`SCALAR`] before all but coordinates and intensity.
-    Scalars,
+pub(super) enum PropertyNames {
+    /// Names of the attributes.
+    Plain,
+    /// The same with [`SCALAR`] before all but coordinates and intensity.
+    CloudCompare,
 }
 
-/// Writes the returns of a cloud whose columns are even.
-///
-/// Numbers of two bytes become `int`: readers that many use drop a `ushort`.
-pub(super) fn write(
-    cloud: &PointCloud,
-    names: &Names,
-    called: Called,
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    let attributes = Attribute::of(cloud);
-    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-    writeln!(out, "comment metres, radians; x forward, y left, z up")?;
-    for line in all_lines(cloud, names) {
-        writeln!(out, "comment {line}")?;
-    }
-    writeln!(out, "element vertex {}", cloud.returns())?;
-    for attribute in &attributes {
-        let kind = match attribute.kind(cloud) {
-            Kind::U1 => "uchar",
-            Kind::F4 => "float",
-            Kind::F8 => "double",
-            _ => "int",
-        };
-        let is_known =
-            matches!(attribute, Attribute::X | Attribute::Y | Attribute::Z | Attribute::Intensity);
-        let before = if is_known || called == Called::AsTheyAre { "" } else { SCALAR };
-        writeln!(out, "property {kind} {before}{}", attribute.name())?;
-    }
-    writeln!(out, "end_header")?;
-    let mut bytes = Vec::new();
-    for point in returns(cloud) {
-        bytes.clear();
-        for attribute in &attributes {
-            match attribute.value(cloud, point) {
-                Value::U2(value) => bytes.extend(i32::from(value).to_le_bytes()),
-                value => value.append_to(&mut bytes),
-            }
+impl CloudWriter for PropertyNames {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Plain => "ply",
+            Self::CloudCompare => "ply-cloudcompare",
         }
-        out.write_all(&bytes)?;
     }
-    Ok(())
+
+    fn extension(&self) -> &'static str {
+        "ply"
+    }
+
+    fn file_name(&self, scan: u64) -> String {
+        match self {
+            Self::Plain => format!("scan-{scan:06}.ply"),
+            Self::CloudCompare => format!("scan-{scan:06}-cloudcompare.ply"),
+        }
+    }
+
+    fn holds_further(&self, further: Further) -> bool {
+        further != Further::EmptyPixels
+    }
+
+    // Numbers of two bytes become `int`: readers that many use drop a `ushort`.
+    fn write(&self, cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let attributes = Attribute::of(cloud);
+        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+        writeln!(out, "comment metres, radians; x forward, y left, z up")?;
+        for line in all_lines(cloud, names) {
+            writeln!(out, "comment {line}")?;
+        }
+        writeln!(out, "element vertex {}", cloud.returns())?;
+        for attribute in &attributes {
+            let kind = match attribute.kind(cloud) {
+                Kind::U1 => "uchar",
+                Kind::F4 => "float",
+                Kind::F8 => "double",
+                _ => "int",
+            };
+            let is_known = matches!(
+                attribute,
+                Attribute::X | Attribute::Y | Attribute::Z | Attribute::Intensity
+            );
+            let before = if is_known || *self == PropertyNames::Plain { "" } else { SCALAR };
+            writeln!(out, "property {kind} {before}{}", attribute.name())?;
+        }
+        writeln!(out, "end_header")?;
+        let mut bytes = Vec::new();
+        for point in returns(cloud) {
+            bytes.clear();
+            for attribute in &attributes {
+                match attribute.value(cloud, point) {
+                    Value::U2(value) => bytes.extend(i32::from(value).to_le_bytes()),
+                    value => value.append_to(&mut bytes),
+                }
+            }
+            out.write_all(&bytes)?;
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -75,7 +96,7 @@ mod tests {
 
     fn written(cloud: &PointCloud, names: &Names) -> (String, Vec<u8>) {
         let mut bytes = Vec::new();
-        write(cloud, names, Called::AsTheyAre, &mut bytes).unwrap();
+        PropertyNames::Plain.write(cloud, names, &mut bytes).unwrap();
         let end = b"end_header\n";
         let at = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
         (String::from_utf8(bytes[..at].to_vec()).unwrap(), bytes[at..].to_vec())

@@ -277,7 +277,8 @@ fn text(
 
 #[cfg(test)]
 mod tests {
-    use super::super::ply::{self, Called};
+    use super::super::format::CloudWriter;
+    use super::super::ply::PropertyNames;
     use super::super::{Names, sample_cloud};
     use super::*;
 
@@ -290,9 +291,9 @@ mod tests {
         let cloud = sample_cloud();
         let objects = ["car".to_owned(), "road".to_owned()];
         let names = Names { objects: &objects, materials: &[] };
-        let [bytes, scalars] = [Called::AsTheyAre, Called::Scalars].map(|called| {
+        let [bytes, scalars] = [PropertyNames::Plain, PropertyNames::CloudCompare].map(|kind| {
             let mut bytes = Vec::new();
-            ply::write(&cloud, &names, called, &mut bytes).unwrap();
+            kind.write(&cloud, &names, &mut bytes).unwrap();
             bytes
         });
         let header = String::from_utf8_lossy(&scalars);

@@ -1,5 +1,9 @@
 //! Range image as 16-bit grey PNG: metres = value / 256, 0 = no return.
 
+use super::Names;
+use super::attributes::Attribute;
+use super::format::CloudWriter;
+use super::holding::{Further, Holding};
 use super::{Error, Format};
 use crate::points::PointCloud;
 use std::io::{self, BufReader, Write};
@@ -29,23 +33,52 @@ pub struct RangeImage {
     pub range: Vec<f32>,
 }
 
-/// Writes the range image of a cloud whose columns are even: of each pixel the return picked.
-pub(super) fn write(cloud: &PointCloud, out: &mut dyn Write) -> io::Result<()> {
-    let [width, height] = [cloud.columns, cloud.rows]
-        .map(|length| u32::try_from(length).ok().filter(|&length| length > 0));
-    let (Some(width), Some(height)) = (width, height) else {
-        return Err(io::Error::other("an image needs at least one row and one column"));
-    };
-    let mut encoder = png::Encoder::new(out, width, height);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(png::BitDepth::Sixteen);
-    encoder.add_text_chunk(KEYWORD.into(), DECLARATION.into())?;
-    let image = cloud.image(cloud.pick).spread(&cloud.distances(), f32::NAN);
-    let grey: Vec<u8> =
-        image.into_iter().flat_map(|range| grey_from_range(range).to_be_bytes()).collect();
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(&grey)?;
-    Ok(writer.finish()?)
+/// Range image of each pixel's picked return, 16-bit grey.
+pub(super) struct Png;
+
+impl CloudWriter for Png {
+    fn name(&self) -> &'static str {
+        "png"
+    }
+
+    fn file_name(&self, scan: u64) -> String {
+        format!("range-{scan:06}.png")
+    }
+
+    fn is_range_image(&self) -> bool {
+        true
+    }
+
+    fn holds(&self, attribute: Attribute) -> Holding {
+        match attribute {
+            Attribute::Range => Holding::Partly("steps of 1/256 m, up to 255.99 m"),
+            Attribute::Row | Attribute::Column | Attribute::Ring => Holding::Partly("by the place"),
+            _ => Holding::Not,
+        }
+    }
+
+    // Images have no coordinates.
+    fn holds_further(&self, further: Further) -> bool {
+        matches!(further, Further::EmptyPixels | Further::Digits)
+    }
+
+    fn write(&self, cloud: &PointCloud, _names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let [width, height] = [cloud.columns, cloud.rows]
+            .map(|length| u32::try_from(length).ok().filter(|&length| length > 0));
+        let (Some(width), Some(height)) = (width, height) else {
+            return Err(io::Error::other("an image needs at least one row and one column"));
+        };
+        let mut encoder = png::Encoder::new(out, width, height);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        encoder.add_text_chunk(KEYWORD.into(), DECLARATION.into())?;
+        let image = cloud.image(cloud.pick).spread(&cloud.distances(), f32::NAN);
+        let grey: Vec<u8> =
+            image.into_iter().flat_map(|range| grey_from_range(range).to_be_bytes()).collect();
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&grey)?;
+        Ok(writer.finish()?)
+    }
 }
 
 /// A return is never written as 0, however near it is.
@@ -111,7 +144,7 @@ mod tests {
     fn an_image_comes_back_within_half_a_step() {
         let cloud = sample_cloud();
         let mut bytes = Vec::new();
-        write(&cloud, &mut bytes).unwrap();
+        Png.write(&cloud, &Names::default(), &mut bytes).unwrap();
         let image = decode(Cursor::new(bytes)).unwrap();
         assert_eq!((image.rows, image.columns), (2, 3));
         let written = cloud.image(cloud.pick).spread(&cloud.distances(), f32::NAN);
@@ -125,7 +158,7 @@ mod tests {
 
     #[test]
     fn an_image_of_nothing_and_an_undeclared_one_are_refused() {
-        assert!(write(&PointCloud::default(), &mut Vec::new()).is_err());
+        assert!(Png.write(&PointCloud::default(), &Names::default(), &mut Vec::new()).is_err());
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
         encoder.set_depth(png::BitDepth::Sixteen);

@@ -1,7 +1,7 @@
 //! The files of a run, written scan by scan.
 
 use super::mcap::Recording as Messages;
-use super::{Error, Format, Names, attributes, write_atomically, write_even, write_named};
+use super::{Error, Format, Names, attributes, write_atomically, write_named};
 use crate::points::PointCloud;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ impl Recording {
             let file = name(format);
             let path = self.folder.join(&file);
             let Format::Mcap(message) = format else {
-                let write = |out: &mut dyn Write| write_even(format, (cloud, names), out);
+                let write = |out: &mut dyn Write| format.writer().write(cloud, names, out);
                 match self.is_named {
                     true => write_named(&path, write),
                     false => write_atomically(&path, write),

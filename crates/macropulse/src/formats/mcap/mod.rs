@@ -15,11 +15,13 @@ mod reader;
 mod ros2;
 mod zstd;
 
-pub(super) use profile::holding as profile_holding;
 pub(super) use reader::Messages;
 
 use super::about::{list_line, name_lines};
 use super::atomic::{growing, growing_named};
+use super::attributes::Attribute;
+use super::format::CloudWriter;
+use super::holding::{Further, Holding};
 use super::{Error, Names};
 use crate::points::PointCloud;
 use ::mcap::records::{MessageHeader, Metadata};
@@ -209,21 +211,61 @@ impl Recording {
     }
 }
 
-/// A file with one scan alone, whose columns are even.
-pub(super) fn write(
-    message: Message,
-    cloud: &PointCloud,
-    names: &Names,
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    let mut file = Cursor::new(Vec::new());
-    let written = (|| {
-        let mut recorder = Recorder::begin(message, &mut file)?;
-        recorder.add(cloud, names)?;
-        recorder.writer.finish()
-    })();
-    written.map_err(cause)?;
-    out.write_all(file.get_ref())
+impl CloudWriter for Message {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Ros2(Profile::Extended) => "mcap",
+            Self::Ros2(Profile::Velodyne) => "mcap-velodyne",
+            Self::Ros2(Profile::Ouster) => "mcap-ouster",
+            Self::Ros2(Profile::Livox) => "mcap-livox",
+            Self::Ros2(Profile::Autoware) => "mcap-autoware",
+            Self::Foxglove => "mcap-foxglove",
+            Self::Osi => "mcap-osi",
+        }
+    }
+
+    fn extension(&self) -> &'static str {
+        "mcap"
+    }
+
+    fn file_name(&self, _scan: u64) -> String {
+        format!("{}.mcap", self.name().replace("mcap", "scans"))
+    }
+
+    fn is_of_run(&self) -> bool {
+        true
+    }
+
+    fn holds(&self, attribute: Attribute) -> Holding {
+        match self {
+            Self::Ros2(profile) => profile.holds(attribute),
+            Self::Foxglove => Holding::Whole,
+            Self::Osi => osi::holds(attribute),
+        }
+    }
+
+    fn holds_further(&self, further: Further) -> bool {
+        match (self, further) {
+            (Self::Ros2(profile), Further::EmptyPixels) => profile.is_organised(),
+            (Self::Ros2(profile), Further::Digits) => *profile == Profile::Extended,
+            (Self::Ros2(_), Further::Pose | Further::Names | Further::Stamp) => true,
+            (Self::Foxglove, further) => further != Further::EmptyPixels,
+            (Self::Osi, further) => {
+                matches!(further, Further::Names | Further::Stamp | Further::Digits)
+            }
+        }
+    }
+
+    fn write(&self, cloud: &PointCloud, names: &Names, out: &mut dyn Write) -> io::Result<()> {
+        let mut file = Cursor::new(Vec::new());
+        let written = (|| {
+            let mut recorder = Recorder::begin(*self, &mut file)?;
+            recorder.add(cloud, names)?;
+            recorder.writer.finish()
+        })();
+        written.map_err(cause)?;
+        out.write_all(file.get_ref())
+    }
 }
 
 fn cause(error: McapError) -> io::Error {

@@ -1,5 +1,7 @@
 //! The messages of ASAM OSI 3.7: what the lidar detected and, with the truth, what it might have.
 
+use super::super::attributes::Attribute;
+use super::super::holding::Holding;
 use super::protobuf::{Described, Of, Package, descriptor_set};
 use super::{Payload, Topic, stamp_ns};
 use crate::points::{NO_OBJECT, Outcome, PointCloud};
@@ -8,6 +10,22 @@ use ::mcap::records::Metadata;
 use prost::Message;
 use std::collections::BTreeMap;
 use std::io;
+
+/// Says how a detection or a reflection holds an attribute of a point.
+pub(super) fn holds(attribute: Attribute) -> Holding {
+    use Holding::{Not, Partly, Whole};
+    match attribute {
+        Attribute::X | Attribute::Y | Attribute::Z => Partly("as distance, azimuth, elevation"),
+        Attribute::Intensity => Partly("`reflectivity`; `intensity` in percent"),
+        Attribute::Range | Attribute::RadialVelocity => Whole,
+        Attribute::Row | Attribute::Ring => Partly("`beam_id`"),
+        Attribute::TimeNs => Partly("of the scan alone"),
+        Attribute::TrueRange => Partly("`time_of_flight` of a reflection"),
+        Attribute::Object => Partly("`object_id`"),
+        Attribute::Outcome => Partly("`classification`: right, near and edge, wrong, false"),
+        _ => Not,
+    }
+}
 
 /// The version of OSI whose messages these are.
 const VERSION: [u32; 3] = [3, 7, 0];

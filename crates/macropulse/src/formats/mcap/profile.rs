@@ -130,25 +130,25 @@ pub(super) fn fields(profile: Profile, cloud: &PointCloud) -> (usize, Vec<Field>
     (step, rows.iter().filter(is_there).map(field).collect())
 }
 
-/// How a profile holds an attribute: as it is, in words how else, or not at all.
-pub(in super::super) fn holding(profile: Profile, attribute: Attribute) -> Holding {
-    let rows = match profile {
-        Profile::Extended => return Holding::Whole,
-        Profile::Velodyne => VELODYNE,
-        Profile::Ouster => OUSTER,
-        Profile::Livox => LIVOX,
-        Profile::Autoware => AUTOWARE,
-    };
-    // The ring is the row.
-    let asked = if attribute == Attribute::Row { Attribute::Ring } else { attribute };
-    let found = rows.iter().find_map(|(_, _, quantity)| {
-        let (held, how) = quantity.holds()?;
-        (held == asked).then_some(how)
-    });
-    found.unwrap_or(Holding::Not)
-}
-
 impl Profile {
+    /// Says how this profile holds an attribute: as it is, in words how else, or not at all.
+    pub(super) fn holds(self, attribute: Attribute) -> Holding {
+        let rows = match self {
+            Self::Extended => return Holding::Whole,
+            Self::Velodyne => VELODYNE,
+            Self::Ouster => OUSTER,
+            Self::Livox => LIVOX,
+            Self::Autoware => AUTOWARE,
+        };
+        // The ring is the row.
+        let asked = if attribute == Attribute::Row { Attribute::Ring } else { attribute };
+        let found = rows.iter().find_map(|(_, _, quantity)| {
+            let (held, how) = quantity.holds()?;
+            (held == asked).then_some(how)
+        });
+        found.unwrap_or(Holding::Not)
+    }
+
     /// Returns true if the image of its driver has a line for each column, with the lasers from the lowest
     /// one up.
     pub(super) fn is_by_column(self) -> bool {
@@ -156,7 +156,7 @@ impl Profile {
     }
 
     /// Returns true if its driver writes images, with a point for each pixel.
-    pub(in super::super) fn is_organised(self) -> bool {
+    pub(super) fn is_organised(self) -> bool {
         !matches!(self, Self::Livox | Self::Autoware)
     }
 }
