@@ -233,7 +233,7 @@ impl<'a> Run<'a> {
         }
         let mut found = Vec::new();
         for format in scenario.formats.iter().filter(|_| scenario.truth) {
-            let left_out = format.leaves_out_of_truth(self.design.emission.model().sees_doppler());
+            let left_out = format.leaves_out_of_truth(self.design.emission.model().sees_motion());
             if !left_out.is_empty() {
                 let (name, left_out) = (format.name(), left_out.join(", "));
                 found.push(format!("{name} cannot hold {left_out}: left out in spite of --truth"));

@@ -18,7 +18,7 @@ use super::Error;
 pub const SHOTS: u64 = 20_000;
 
 /// The sensors that are tried.
-pub const SENSORS: [&str; 15] = [
+pub const SENSORS: [&str; 16] = [
     "kim-park-2016",
     "kim-park-2016-fixed",
     "coded-32",
@@ -32,6 +32,7 @@ pub const SENSORS: [&str; 15] = [
     "spad-flash",
     "spad-spinning",
     "itof-camera",
+    "kinect-v2",
     "amcw-scanner",
     "fmcw-1550",
 ];

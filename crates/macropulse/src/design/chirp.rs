@@ -154,7 +154,7 @@ impl Model for Chirp {
         "as far as its samples hold the beats"
     }
 
-    fn sees_doppler(&self) -> bool {
+    fn sees_motion(&self) -> bool {
         true
     }
 

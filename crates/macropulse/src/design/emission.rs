@@ -56,7 +56,7 @@ pub trait Model {
     }
 
     /// True if the motion of a surface changes the record of its echo.
-    fn sees_doppler(&self) -> bool {
+    fn sees_motion(&self) -> bool {
         false
     }
 

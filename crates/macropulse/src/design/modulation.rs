@@ -99,6 +99,11 @@ impl Modulation {
         i64::from(tap) * (self.exposure_fs + self.gap_fs)
     }
 
+    /// Time, s, from the shot to the middle of the exposure of tap number `tap`.
+    pub fn middle(&self, tap: u32) -> f64 {
+        s_from_fs(self.begins_fs(tap)) + 0.5 * s_from_fs(self.exposure_fs)
+    }
+
     /// The highest modulation frequency, Hz.
     pub fn highest(&self) -> f64 {
         self.hz.iter().fold(0.0, |most: f64, hz| most.max(*hz))
@@ -128,6 +133,11 @@ impl Model for Modulation {
         let whole = libm::floor(seconds / (exposure + gap));
         let rest = (seconds - whole * (exposure + gap)).min(exposure);
         ((whole * exposure + rest) / (f64::from(self.taps()) * exposure)).min(1.0)
+    }
+
+    /// Its exposures follow one another, and a surface moves on between them.
+    fn sees_motion(&self) -> bool {
+        true
     }
 
     fn occupancy(&self) -> Option<Occupancy> {
@@ -355,7 +365,11 @@ mod tests {
             ("tdc.resolution_ps", "100", "has no effect because of `modulation`"),
             ("receiver.correct_harmonics", "true", "has no effect because of `modulation.wave`"),
             ("receiver.kind", "histogram", "`phase` for a [modulation]"),
-            ("without", "link-budget", "counts its noise in electrons"),
+            (
+                "idealised",
+                "[\"link-budget\", \"eye-safety\", \"mirror-motion\"]",
+                "counts its noise in electrons",
+            ),
         ] {
             let set = [(key.to_owned(), value.to_owned())];
             let error = Design::open("itof-camera", &set).unwrap_err().to_string();

@@ -2,9 +2,10 @@
 //!
 //! Each exposure of a shot is a tap, one of T. Light of the shot itself reaches it along all paths at once. A
 //! path of N detected photons brings the charge N/T·(1 + c·cos(2πfτ − θ)), or that of a triangle instead of
-//! the cosine. Here τ is its time of flight, f and θ are frequency and phase of the tap, and c is its
-//! contrast. Steady light adds the same to every tap. A pulse of another lidar adds its photons times the
-//! gain of the tap at its arrival. The electrons of a tap are a Poisson variable.
+//! the cosine. Here τ is its time of flight in the middle of the exposure, f and θ are frequency and phase of the
+//! tap, and c is its contrast. A surface that approaches at v shortens τ by 2v/c per second. Steady light adds the
+//! same to every tap. A pulse of another lidar adds its photons times the gain of the tap at its arrival. The
+//! electrons of a tap are a Poisson variable.
 
 use std::f64::consts::TAU;
 
@@ -17,7 +18,17 @@ use crate::design::detector::LockIn;
 use crate::design::emission::Model;
 use crate::design::{Design, Modulation};
 use crate::random::{Chance, Stage};
-use crate::units::s_from_fs;
+use crate::units::{s_from_fs, tof_from_range};
+
+/// A way that light of a shot takes.
+struct Path {
+    /// Photons of the whole shot.
+    photons: f64,
+    /// Time of flight of light that leaves as the shot is fired, s.
+    tof: f64,
+    /// Speed at which the surface approaches, m/s.
+    velocity: f64,
+}
 
 /// Pixels that collect light in step with its modulation, at work.
 #[derive(Debug)]
@@ -53,8 +64,11 @@ impl Demodulator {
             means.extend(of_responses.iter().map(|electrons| of_each + electrons));
             let from = own.partition_point(|(of, _)| *of < number);
             for &(_, train) in own[from..].iter().take_while(|(of, _)| *of == number) {
-                let tof_fs = light.trains.arrives_fs[train] - fired_fs;
-                self.add_path(&mut means, light.trains.photons[train], s_from_fs(tof_fs));
+                let tof = s_from_fs(light.trains.arrives_fs[train] - fired_fs);
+                let velocity = light.trains.radial_velocity.get(train).copied().unwrap_or(0.0);
+                let path =
+                    Path { photons: light.trains.photons[train], tof, velocity: velocity.into() };
+                self.add_path(&mut means, &path);
             }
             self.add_pulses(&mut means, (channel, fired_fs), (&others, light));
             self.add_stretches(&mut means, (channel, fired_fs), light);
@@ -81,11 +95,15 @@ impl Demodulator {
         })
     }
 
-    /// Adds the electrons of a path along which `photons` of the whole shot come.
-    fn add_path(&self, means: &mut [f64], photons: f64, tof: f64) {
-        let each = photons * self.efficiency / f64::from(self.lock_in.modulation.taps());
-        for (mean, (hz, contrast, phase)) in means.iter_mut().zip(self.each_tap()) {
-            *mean += each * self.lock_in.modulation.wave.share(contrast, TAU * hz * tof - phase);
+    /// Adds the electrons of light that comes along `path`.
+    fn add_path(&self, means: &mut [f64], path: &Path) {
+        let modulation = &self.lock_in.modulation;
+        let each = path.photons * self.efficiency / f64::from(modulation.taps());
+        let shortens = tof_from_range(path.velocity);
+        for (tap, (mean, (hz, contrast, phase))) in (0..).zip(means.iter_mut().zip(self.each_tap()))
+        {
+            let tof = path.tof - shortens * modulation.middle(tap);
+            *mean += each * modulation.wave.share(contrast, TAU * hz * tof - phase);
         }
     }
 
@@ -95,7 +113,7 @@ impl Demodulator {
         for response in &light.responses {
             for (step, photons) in response.photons.iter().enumerate() {
                 let tof = (step as f64 + 0.5) * s_from_fs(response.step_fs);
-                self.add_path(&mut means, *photons, tof);
+                self.add_path(&mut means, &Path { photons: *photons, tof, velocity: 0.0 });
             }
         }
         means

@@ -24,7 +24,7 @@ impl Scene {
         let directions = design.directions();
         let along = |shot: usize| directions.of_shot(log, shot);
         let mut middle = self.trace_along(design, log, along);
-        if design.emission.model().sees_doppler() {
+        if design.emission.model().sees_motion() {
             middle.radial_velocity = self.radial_velocities(design, log, &middle);
         }
         if !design.scan.moves {

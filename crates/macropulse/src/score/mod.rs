@@ -149,7 +149,7 @@ pub fn judge(
             let judged = edge(surface(source, outcome), traced, shot, (&gate, measured));
             let outcome = judged.outcome;
             piece.points.truth.returns.set(at, judged);
-            if design.emission.model().sees_doppler() {
+            if design.emission.model().sees_motion() {
                 velocities.push(approaches(source).unwrap_or(f32::NAN));
             }
             let points = &piece.points;

@@ -10,7 +10,7 @@ use super::{Budget, CoScanned, Eye, Field, mode, solid_angle};
 use crate::design::detector::Efficiency;
 use crate::design::light::EnergyFile;
 use crate::design::limits::Check;
-use crate::design::safety::{Limit, strictest};
+use crate::design::safety::{Beams, Limit, strictest};
 use crate::design::{Effect, Emission, Error, Light, Readout, Scan};
 use crate::units::tof_from_range;
 
@@ -61,6 +61,8 @@ pub(in crate::design) struct SafetyFile {
     distance_mm: f64,
     /// True if the groups of shots that cross an eye, as the lines of a raster, count as repeated exposures.
     count_lines: bool,
+    /// True if the light of a flash comes from a source as wide as its beam, as a diffuser is, and not from a point.
+    extended_source: bool,
 }
 
 /// The keys of a file that declare a budget.
@@ -111,7 +113,8 @@ impl Check<'_> {
         };
         let wavelength = parts.light.wavelength;
         let distance = self.within("safety.distance_mm", safety.distance_mm, 1.0, 1e5)? * 1e-3;
-        let eye = Eye { distance, count_groups: safety.count_lines };
+        let source = self.source(safety, parts)?;
+        let eye = Eye { distance, count_groups: safety.count_lines, source };
         let limits = OnceLock::new();
         let allowed = || {
             let Parts { scan, light, emission, .. } = parts;
@@ -134,6 +137,19 @@ impl Check<'_> {
             field,
             efficiency: self.within(path, efficiency, 1e-6, 1.0)?,
         }))
+    }
+
+    /// Width of the source that an eye sees, m; 0 for a point.
+    fn source(&self, safety: &SafetyFile, parts: &Parts) -> Result<f64, Error> {
+        let is_flash = matches!(parts.scan.model().beams(), Beams::Flood(_));
+        match safety.extended_source {
+            false => Ok(0.0),
+            true if is_flash => Ok(parts.light.beam_diameter),
+            true => self.refuse(
+                "safety.extended_source",
+                "must be false, as only [scan.flash] spreads its light from its source on: a beam looks like a point",
+            ),
+        }
     }
 
     /// The energy of a shot, J: as typed, or the most that class 1 allows.

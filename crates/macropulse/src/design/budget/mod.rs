@@ -7,7 +7,9 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 pub(in crate::design) use check::{BudgetFile, OpticsFile, Parts, SafetyFile};
 
-use super::safety::{Class1, Condition, Limit, Sender, exposure, limits, strictest_of_each};
+use super::safety::{
+    Class1, Condition, Limit, Sender, exposure, limits, strictest, strictest_of_each,
+};
 use super::{Emission, Light, Scan};
 use crate::units::{PLANCK, SPEED_OF_LIGHT};
 
@@ -41,6 +43,8 @@ struct Eye {
     distance: f64,
     /// Set if groups of shots that cross it count as repeated exposures.
     count_groups: bool,
+    /// Width of the source that it sees, m; 0 for a point.
+    source: f64,
 }
 
 /// Field of a detector.
@@ -149,10 +153,19 @@ impl Eye {
 
     fn limits_anew(self, scan: &Scan, light: &Light, emission: &Emission) -> Vec<Limit> {
         let Some(class) = Class1::at(light.wavelength) else { return Vec::new() };
-        let Self { distance, count_groups } = self;
+        let Self { distance, count_groups, source } = self;
         let all = [Condition::bare_eye(distance), class.telescope()].map(|condition| {
             let sender = Sender { scan, light, emission, condition, count_groups };
-            limits(&class, &exposure(&class, &sender))
+            let under = |class: Class1| limits(&class, &exposure(&class, &sender));
+            let point = under(class);
+            if source == 0.0 {
+                return point;
+            }
+            // Any source may be judged as a point: the reading that allows more counts.
+            let extended = under(class.of_source(source, &condition));
+            let least =
+                |limits: &[Limit]| strictest(limits).map_or(f64::INFINITY, |one| one.energy);
+            if least(&extended) > least(&point) { extended } else { point }
         });
         strictest_of_each(&all.concat())
     }

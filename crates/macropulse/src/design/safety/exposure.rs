@@ -131,7 +131,8 @@ pub fn strictest_of_each(limits: &[Limit]) -> Vec<Limit> {
 pub fn limits(class: &Class1, exposure: &Exposure) -> Vec<Limit> {
     let mut all = Vec::new();
     let mut add = |rule, shots: f64, brightness: f64, duration| {
-        let energy = class.single_exposure(duration) / (shots * brightness);
+        let factor = if exposure.count_groups { class.c5_of_long(duration) } else { 1.0 };
+        let energy = factor * class.single_exposure(duration) / (shots * brightness);
         all.push(Limit { rule, distance: exposure.distance, shots, brightness, duration, energy });
     };
     if exposure.mark < exposure.shot {
@@ -363,7 +364,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    const CLASS: Class1 = Class1::Retina { c4: 1.0 };
+    const CLASS: Class1 = Class1::Retina { c4: 1.0, source: 1.5 };
 
     fn of(times: &[f64], count_groups: bool) -> Vec<Limit> {
         let shot = |&time: &f64| Crossing { time, share: 0.5, energy: 1.0 };

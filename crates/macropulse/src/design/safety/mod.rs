@@ -1,5 +1,4 @@
-//! Eye safety: our reading of IEC 60825-1:2014, class 1, point source \[IEC60825\]. Not a
-//! certification. Every assumption is a parameter, or printed by [`ASSUMED`].
+//! Eye safety: our reading of IEC 60825-1:2014, class 1 \[IEC60825\]. Not a certification. Every assumption is a parameter, or printed by [`ASSUMED`].
 //!
 //! It has three steps:
 //!
@@ -26,7 +25,7 @@ pub use exposure::{
 };
 
 /// The assumptions of the limits, for people to read.
-pub const ASSUMED: &str = "IEC 60825-1:2014 class 1, point source, through the aperture at \
+pub const ASSUMED: &str = "IEC 60825-1:2014 class 1, a point source unless safety.extended_source, through the aperture at \
     safety.distance_mm (condition 3), or 2 m away through 50 mm or, above 1400 nm, seven times the \
     aperture (condition 1), where most light crosses it; every shot as bright as the brightest word of \
     its label; groups of shots within T_i counted as repeated exposures if safety.count_lines; a \
