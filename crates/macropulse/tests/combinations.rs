@@ -14,7 +14,7 @@ use macropulse::sim;
 
 const FORMATS: &str = include_str!("../../../docs/formats.md");
 
-const PATTERNS: [&str; 5] = ["raster", "spinning", "flash", "table", "rosette"];
+const PATTERNS: [&str; 6] = ["raster", "spinning", "flash", "table", "rosette", "lissajous"];
 
 /// A table of directions on a disc, once for all tests: without times, so that their rate is typed.
 fn table_file() -> &'static str {
@@ -50,6 +50,10 @@ fn pattern(name: &str) -> String {
         "rosette" => {
             "scan.rosette = { shots_per_s = 320.0, prisms = [{ deflection_deg = 2.0, turns_per_s = \
              7.3 }, { deflection_deg = 2.0, turns_per_s = -4.7 }] }"
+        }
+        "lissajous" => {
+            "scan.lissajous = { shots_per_s = 320.0, horizontal = { field_deg = 8.0, hz = 7.3 }, \
+             vertical = { field_deg = 4.0, hz = 4.7 } }"
         }
         other => panic!("no pattern {other}"),
     };

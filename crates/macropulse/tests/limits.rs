@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
 /// Sensors with every kind of detector, pattern and receiver.
-const SENSORS: [(&str, &str); 8] = [
+const SENSORS: [(&str, &str); 9] = [
     ("kim-park-2016", ""),
     ("kim-park-2016", GEIGER),
     ("kim-park-2016-physical", "optics.field = \"descanned\"\nlight.energy = { shot_nj = 1.0 }"),
@@ -24,7 +24,11 @@ const SENSORS: [(&str, &str); 8] = [
     ("coded-32", "scan.raster.rows = 60\nscan.raster.beams = 4"),
     ("hdl-64e", ""),
     ("rosette-mid-40", ""),
+    ("rosette-mid-40", LISSAJOUS),
 ];
+
+const LISSAJOUS: &str = "scan.lissajous = { shots_per_s = 1e5, horizontal = { field_deg = 40.0, hz = 97.0 }, \
+    vertical = { field_deg = 20.0, hz = 71.3 } }";
 
 const GEIGER: &str = "detector.geiger = { cells = 4, dead_time_ns = 20.0, dark_counts_hz = 1e5, \
     sensitivity = { range_m = 150.0, reflectance = 1.0, pd = 0.99 } }";

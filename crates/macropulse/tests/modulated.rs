@@ -294,12 +294,15 @@ fn modulated_light_goes_with_every_scan_pattern() {
         "azimuth_step_deg = 45.0, blocks = [{ lasers = 4, first_deg = 2.0, step_deg = -1.0 }]";
     let prisms = "shots_per_s = 320.0, prisms = [{ deflection_deg = 2.0, turns_per_s = 7.3 }, \
                   { deflection_deg = 2.0, turns_per_s = -4.7 }]";
+    let mirror = "shots_per_s = 320.0, horizontal = { field_deg = 8.0, hz = 7.3 }, \
+                  vertical = { field_deg = 4.0, hz = 4.7 }";
     let file = format!("file = {:?}, firings_per_s = 320.0", table.path().display().to_string());
     for (name, keys) in [
         ("raster", field),
         ("flash", field),
         ("spinning", turning),
         ("rosette", prisms),
+        ("lissajous", mirror),
         ("table", &file),
     ] {
         let text = format!(

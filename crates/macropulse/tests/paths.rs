@@ -1,13 +1,13 @@
-//! Scan patterns that are no lattice: tables of directions, and rosettes.
+//! Scan patterns that are no lattice: tables of directions, rosettes and figures of Lissajous.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::collections::HashSet;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::path::Path;
 
 use macropulse::design::Design;
-use macropulse::emit::bands;
+use macropulse::emit::{Band, bands};
 use macropulse::scene::Scene;
 use macropulse::sim;
 
@@ -327,6 +327,51 @@ fn a_rosette_is_the_sum_of_its_prisms() {
     let steep = "[{ deflection_deg = 50.0, turns_per_s = 1.0 }, \
                  { deflection_deg = 1.0, turns_per_s = 1.0 }]";
     assert!(told(steep).contains("is 50, but must lie between 0 and 45"));
+}
+
+/// Known answers: azimuth and elevation are sines of time, which runs on from scan to scan. They reach both ends of the
+/// field, and a frame of whole swings repeats.
+#[test]
+fn a_mirror_that_swings_draws_a_figure_of_lissajous() {
+    let with = |horizontal_hz: f64| {
+        let keys = format!(
+            "{{ shots_per_s = 1e5, horizontal = {{ field_deg = 40.0, hz = {horizontal_hz:?}, phase_deg = 90.0 }}, \
+             vertical = {{ field_deg = 20.0, hz = 70.0 }} }}"
+        );
+        let text = format!(
+            "version = 1\nextends = \"rosette-mid-40\"\nname = \"mine\"\n[scan]\nlissajous = {keys}\n"
+        );
+        Design::from_toml(&text, "mine.toml", Path::new(""), &[]).unwrap()
+    };
+    let design = with(100.3);
+    assert_eq!((design.scan.rows, design.scan.columns), (1, 10_000));
+    let extent = design.scan.extent();
+    let sides = [extent.azimuth, extent.elevation].map(|[from, to]| (to - from).to_degrees());
+    assert!((sides[0] - 40.0).abs() < 1e-9 && (sides[1] - 20.0).abs() < 1e-9, "{sides:?}");
+    let log = Band { scan: 3, first: 0, shots: 10_000 }.shot_log(&design);
+    let directions = design.directions();
+    let mut ends = [0.0_f64; 4];
+    for shot in log.owned.clone() {
+        let t = 0.3 + f64::from(log.column[shot]) * 1e-5;
+        let azimuth = 20.0 * (TAU * 100.3 * t + PI / 2.0).sin();
+        let elevation = 10.0 * (TAU * 70.0 * t).sin();
+        assert!(apart(directions.of_shot(&log, shot), unit([azimuth, elevation])) < 1e-9, "{shot}");
+        ends = [
+            ends[0].min(azimuth),
+            ends[1].max(azimuth),
+            ends[2].min(elevation),
+            ends[3].max(elevation),
+        ];
+    }
+    assert!(ends[0] < -19.99 && ends[1] > 19.99 && ends[2] < -9.99 && ends[3] > 9.99, "{ends:?}");
+    for (hz, repeats) in [(100.0, true), (100.3, false)] {
+        let design = with(hz);
+        let [one, other] = [0, 1].map(|scan| {
+            let log = Band { scan, first: 0, shots: 10_000 }.shot_log(&design);
+            design.directions().of_shot(&log, log.owned.start + 777)
+        });
+        assert_eq!(apart(one, other) < 1e-9, repeats, "{hz} Hz");
+    }
 }
 
 /// 2 cm at 20 m, and all of the wall that lies in the field.

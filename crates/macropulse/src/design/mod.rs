@@ -54,8 +54,8 @@ pub use modulation::{Modulation, Wave};
 pub use presets::{names as preset_names, text as preset_text};
 pub use readout::{Clock, Readout, Tdc};
 pub use scan::{
-    Directions, Extent, Firing, Flash, Gates, Grid, Laser, Mirror, Pattern, Polygon, Prism, Raster,
-    Rosette, Scan, Spinning, Table,
+    Directions, Extent, Firing, Flash, Gates, Grid, Laser, Mirror, Pattern, Polygon, Raster, Scan,
+    Spinning, Steered, Table,
 };
 pub use schema::schema;
 pub use spectrum::{Fidelity, Spectrum};

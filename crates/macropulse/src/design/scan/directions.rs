@@ -40,13 +40,32 @@ pub(super) struct Path {
 
 /// A thin prism that turns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prism {
+pub(super) struct Prism {
     /// Angle by which it deflects, rad.
     pub deflection: f64,
     /// Turns per second, positive from the left to the top.
     pub turns_per_s: f64,
     /// Direction of the deflection at the beginning, rad from the left towards the top.
     pub phase: f64,
+}
+
+/// A swing of a mirror about one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Swing {
+    /// Angle of the beam from the middle to either end, rad.
+    pub half: f64,
+    /// Swings per second, there and back.
+    pub hz: f64,
+    /// Phase of the sine at the beginning, rad.
+    pub phase: f64,
+}
+
+impl Swing {
+    /// The angle of the beam at time `t`, s: half·sin(2π·f·t + φ).
+    fn at(&self, t: f64) -> f64 {
+        let swings = self.hz * t;
+        self.half * libm::sin(TAU * (swings - swings.floor()) + self.phase)
+    }
 }
 
 /// The source of the directions of a path.
@@ -56,6 +75,8 @@ pub(super) enum Way {
     List(Arc<[[f64; 3]]>),
     /// Prisms that turn, and the time between shots, s.
     Prisms([Prism; 2], f64),
+    /// Azimuth and elevation of a mirror that swings, and the time between shots, s.
+    Mirror([Swing; 2], f64),
 }
 
 impl Path {
@@ -66,6 +87,11 @@ impl Path {
         match &self.way {
             Way::List(list) => list[number.rem_euclid(list.len().max(1) as i64) as usize],
             Way::Prisms(prisms, step) => deflected(prisms, number as f64 * step),
+            Way::Mirror(swings, step) => {
+                let [azimuth, elevation] = swings.map(|swing| swing.at(number as f64 * step));
+                let across = libm::cos(elevation);
+                [across * libm::cos(azimuth), across * libm::sin(azimuth), libm::sin(elevation)]
+            }
         }
     }
 }

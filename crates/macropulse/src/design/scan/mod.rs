@@ -10,12 +10,14 @@ mod flash;
 mod grid;
 mod hesai;
 mod laser;
+mod lissajous;
 mod model;
 mod ouster;
 mod polygon;
 mod raster;
 mod rosette;
 mod spinning;
+mod steered;
 mod table;
 
 use std::ops::RangeInclusive;
@@ -23,7 +25,7 @@ use std::ops::RangeInclusive;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-pub use directions::{Directions, Prism};
+pub use directions::Directions;
 pub use flash::Flash;
 pub use grid::Grid;
 pub use laser::Laser;
@@ -31,21 +33,21 @@ pub use model::Extent;
 pub(crate) use model::Model;
 pub use polygon::Polygon;
 pub use raster::{Mirror, Raster};
-pub use rosette::Rosette;
 pub use spinning::{Firing, Spinning};
+pub use steered::Steered;
 pub use table::Table;
 
 use super::Error;
 use super::limits::{Check, Idle};
 
-/// The list of all patterns: variant, file in this folder, and name in a sensor file. Every other
+/// The list of all patterns: variant and its type, file in this folder, and name in a sensor file. Every other
 /// list of them follows from this one.
 macro_rules! patterns {
-    ($($(#[$doc:meta])* $Kind:ident, $file:ident, $name:literal;)+) => {
+    ($($(#[$doc:meta])* $Kind:ident($Model:ident), $file:ident, $name:literal;)+) => {
         /// How directions follow each other.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Pattern {
-            $($(#[$doc])* $Kind($Kind),)+
+            $($(#[$doc])* $Kind($Model),)+
         }
 
         impl Pattern {
@@ -100,15 +102,17 @@ macro_rules! patterns {
 
 patterns! {
     /// A beam that a mirror leads over the field line by line, or several side by side.
-    Raster, raster, "raster";
+    Raster(Raster), raster, "raster";
     /// Fixed elevations on a turning head.
-    Spinning, spinning, "spinning";
+    Spinning(Spinning), spinning, "spinning";
     /// Every direction at once.
-    Flash, flash, "flash";
+    Flash(Flash), flash, "flash";
     /// A list of directions, scan after scan.
-    Table, table, "table";
+    Table(Table), table, "table";
     /// One beam through two prisms that turn.
-    Rosette, rosette, "rosette";
+    Rosette(Steered), rosette, "rosette";
+    /// One beam from a mirror that swings about two axes.
+    Lissajous(Steered), lissajous, "lissajous";
 }
 
 /// The table of a pattern in a sensor file.

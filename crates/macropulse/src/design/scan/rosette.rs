@@ -4,24 +4,11 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::directions::{Directions, Path, Prism, Way};
-use super::model::{Extent, Model, Moment};
-use super::table::cell;
-use super::{Pattern, Typed};
+use super::directions::{Prism, Way};
+use super::steered::shots_of;
+use super::{Pattern, Steered, Typed};
 use crate::design::Error;
 use crate::design::limits::Check;
-use crate::design::safety::Beams;
-
-/// One beam through two prisms that turn.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Rosette {
-    /// The prisms.
-    pub prisms: [Prism; 2],
-    /// Shots of a scan.
-    pub shots: u32,
-    /// Time between shots, s.
-    step: f64,
-}
 
 /// `[scan.rosette]` as typed.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -52,15 +39,6 @@ struct PrismFile {
 
 impl Typed for File {
     fn check(&self, check: &Check, period: f64) -> Result<Pattern, Error> {
-        let rate = check.within("scan.rosette.shots_per_s", self.shots_per_s, 1.0, 1e9)?;
-        let shots = (rate * period).round();
-        if !(1.0..=65_535.0).contains(&shots) {
-            let message = format!(
-                "is {rate}, which are {shots} shots in a scan, but 1 to 65535 are possible: change \
-                 scan.scans_per_s"
-            );
-            return check.refuse("scan.rosette.shots_per_s", message);
-        }
         let path = "scan.rosette.prisms";
         let [one, two] = self.prisms.as_slice() else {
             return check.refuse(path, "must be two, as { deflection_deg, turns_per_s }");
@@ -73,103 +51,11 @@ impl Typed for File {
             })
         };
         let prisms = [prism(one)?, prism(two)?];
-        Ok(Pattern::Rosette(Rosette { prisms, shots: shots as u32, step: period / shots }))
-    }
-}
-
-impl Rosette {
-    fn path(&self) -> Path {
-        let way = Way::Prisms(self.prisms, self.step);
-        Path { per_scan: self.shots.into(), rows: 1, way }
-    }
-
-    /// The directions of the first scan, in their order.
-    fn first_scan(&self) -> Vec<[f64; 3]> {
-        let directions = self.directions();
-        (0..self.shots).map(|shot| directions.of(0, shot as u16)).collect()
-    }
-}
-
-impl Model for Rosette {
-    fn summary(&self) -> String {
-        "one beam, two prisms that turn".to_owned()
-    }
-
-    fn size(&self) -> [u32; 2] {
-        [1, self.shots]
-    }
-
-    fn channels(&self) -> u32 {
-        1
-    }
-
-    fn channel_of(&self, _order: u64, _row: u16) -> u16 {
-        0
-    }
-
-    fn pixel(&self, order: u64) -> (u16, u16) {
-        (0, order as u16)
-    }
-
-    fn order_of(&self, _row: u16, column: u16) -> u64 {
-        column.into()
-    }
-
-    fn moment(&self, order: u64, _period: f64) -> Moment {
-        Moment { shots: order, then: 0.0 }
-    }
-
-    fn equal_steps(&self) -> bool {
-        true
-    }
-
-    fn line(&self) -> u64 {
-        1
-    }
-
-    fn draws_from_the_left(&self) -> bool {
-        false
-    }
-
-    fn shortest_dwell(&self, pixel_period: f64) -> f64 {
-        pixel_period
-    }
-
-    fn moves_by(&self) -> Option<f64> {
-        None
-    }
-
-    fn directions(&self) -> Directions {
-        Directions::along(self.path())
-    }
-
-    fn pixel_at(&self, _azimuth: f64, _elevation: f64) -> Option<(u16, u16)> {
-        None
-    }
-
-    fn cell(&self) -> [f64; 2] {
-        cell(&self.first_scan(), 1)
-    }
-
-    /// The square about the disc.
-    fn extent(&self) -> Extent {
-        let [one, two] = self.prisms.map(|prism| prism.deflection);
-        Extent::centred([2.0 * (one + two); 2])
-    }
-
-    fn shared_field(&self) -> Option<[f64; 2]> {
-        None
-    }
-
-    fn follows(&self) -> bool {
-        true
-    }
-
-    fn beams(&self) -> Beams {
-        Beams::Scattered(self.first_scan())
-    }
-
-    fn is_lattice(&self) -> bool {
-        false
+        let key = "scan.rosette.shots_per_s";
+        let shots = shots_of(check, key, self.shots_per_s, period)?;
+        // The square about the disc.
+        let side = 2.0 * prisms.iter().map(|prism| prism.deflection).sum::<f64>();
+        let way = Way::Prisms(prisms, period / f64::from(shots));
+        Ok(Pattern::Rosette(Steered { way, shots, sides: [side; 2] }))
     }
 }
