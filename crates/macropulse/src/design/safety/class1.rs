@@ -22,7 +22,7 @@ pub enum Class1 {
     Retina {
         /// C4 = 10^(0.002·(λ/nm − 700)).
         c4: f64,
-        /// Angle α that the source subtends, mrad; [`POINT`] for a point.
+        /// Angle α that the source subtends, mrad; 1.5 for a point.
         source: f64,
     },
     /// 1400 to 1500 nm: the light is absorbed before it reaches the retina, part of it in the lens.
