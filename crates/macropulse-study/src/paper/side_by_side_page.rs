@@ -32,9 +32,11 @@ pub(super) fn section(findings: &Findings) -> Result<Section, Error> {
              one field of 24\u{b0} by 6\u{b0}, 16 rows and 64 columns, 2.5 scans a second, one beam of 905 nm, \
              an aperture of 15 mm and a range gate of {GATE:.0} m. All send what class 1 allows, and that \
              depends on how long the light of a shot lasts. Each keeps the detector and the receiver of \
-             its ready sensor."
+             its ready sensor. Energy and length are those of a shot. Right pixels and precision are those \
+             of the scene below."
         ))
         .table(sensors(&findings.sides))
+        .table(detectors(&findings.sides))
         .block(Block::Heading(format!("The scene `{SCENE}`, by day")))
         .block(Block::Gallery(2, images(&findings.sides)?))
         .block(Block::Heading("Detection and precision".into()))
@@ -94,11 +96,10 @@ fn sensors(sides: &[Side]) -> Table {
     let header = [
         ("lidar", Align::Left),
         ("made of", Align::Left),
-        ("energy of a shot, nJ", Align::Right),
-        ("light of a shot lasts, \u{b5}s", Align::Right),
-        ("detector", Align::Left),
-        ("pixels right in the scene", Align::Right),
-        ("precision there, mm", Align::Right),
+        ("energy, nJ", Align::Right),
+        ("length, \u{b5}s", Align::Right),
+        ("right pixels", Align::Right),
+        ("precision, mm", Align::Right),
     ];
     sides.iter().fold(Table::new("", &header), |table, side| {
         let design = &side.design;
@@ -112,10 +113,17 @@ fn sensors(sides: &[Side]) -> Table {
             Cell::from(format!("`{}`", side.lidar.sensor)),
             Cell::from(format!("{:.0}", energy * 1e9)),
             Cell::from(format!("{:.3}", lasts * 1e6)),
-            Cell::from(design.detector.model().summary()),
             Cell::from(format!("{:.1} %", 100.0 * right(&side.score))),
             Cell::from(format!("{:.1}", side.precision * 1e3)),
         ])
+    })
+}
+
+fn detectors(sides: &[Side]) -> Table {
+    let header = [("lidar", Align::Left), ("detector", Align::Left)];
+    sides.iter().fold(Table::new("", &header), |table, side| {
+        let detector = side.design.detector.model().summary();
+        table.row(vec![Cell::from(side.lidar.name), Cell::from(detector)])
     })
 }
 
