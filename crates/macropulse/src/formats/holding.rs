@@ -15,6 +15,22 @@ pub(super) enum Holding {
     Not,
 }
 
+impl Holding {
+    /// How a format that has these `attributes` alone holds one of them, or another.
+    pub fn among(attributes: &[Attribute], attribute: Attribute) -> Self {
+        if attributes.contains(&attribute) { Self::Whole } else { Self::Not }
+    }
+
+    /// How an image whose pixels hold a range in this way holds an `attribute`.
+    pub fn in_image(range: Self, attribute: Attribute) -> Self {
+        match attribute {
+            Attribute::Range => range,
+            Attribute::Row | Attribute::Column | Attribute::Ring => Self::Partly("by the place"),
+            _ => Self::Not,
+        }
+    }
+}
+
 /// Contents of a file beside the attributes of its points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Further {
@@ -32,6 +48,11 @@ pub(super) enum Further {
 
 impl Further {
     const ALL: [Self; 5] = [Self::EmptyPixels, Self::Pose, Self::Names, Self::Stamp, Self::Digits];
+
+    /// True if an image of ranges holds it. Such an image has no coordinates, and so loses no digits of theirs.
+    pub fn is_in_image(self) -> bool {
+        matches!(self, Self::EmptyPixels | Self::Digits)
+    }
 
     fn name(self) -> &'static str {
         match self {

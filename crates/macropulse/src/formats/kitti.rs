@@ -31,7 +31,7 @@ impl CloudWriter for Kitti {
     }
 
     fn holds(&self, attribute: Attribute) -> Holding {
-        if ATTRIBUTES.contains(&attribute) { Holding::Whole } else { Holding::Not }
+        Holding::among(&ATTRIBUTES, attribute)
     }
 
     fn holds_further(&self, _further: Further) -> bool {

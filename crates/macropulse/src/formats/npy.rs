@@ -67,16 +67,11 @@ impl CloudWriter for RangeNpy {
     }
 
     fn holds(&self, attribute: Attribute) -> Holding {
-        match attribute {
-            Attribute::Range => Holding::Whole,
-            Attribute::Row | Attribute::Column | Attribute::Ring => Holding::Partly("by the place"),
-            _ => Holding::Not,
-        }
+        Holding::in_image(Holding::Whole, attribute)
     }
 
-    // Images have no coordinates.
     fn holds_further(&self, further: Further) -> bool {
-        matches!(further, Further::EmptyPixels | Further::Digits)
+        further.is_in_image()
     }
 
     fn write(&self, cloud: &PointCloud, _names: &Names, out: &mut dyn Write) -> io::Result<()> {

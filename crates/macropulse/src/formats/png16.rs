@@ -50,16 +50,11 @@ impl CloudWriter for Png {
     }
 
     fn holds(&self, attribute: Attribute) -> Holding {
-        match attribute {
-            Attribute::Range => Holding::Partly("steps of 1/256 m, up to 255.99 m"),
-            Attribute::Row | Attribute::Column | Attribute::Ring => Holding::Partly("by the place"),
-            _ => Holding::Not,
-        }
+        Holding::in_image(Holding::Partly("steps of 1/256 m, up to 255.99 m"), attribute)
     }
 
-    // Images have no coordinates.
     fn holds_further(&self, further: Further) -> bool {
-        matches!(further, Further::EmptyPixels | Further::Digits)
+        further.is_in_image()
     }
 
     fn write(&self, cloud: &PointCloud, _names: &Names, out: &mut dyn Write) -> io::Result<()> {

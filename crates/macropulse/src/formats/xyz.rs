@@ -23,7 +23,7 @@ impl CloudWriter for Xyz {
     }
 
     fn holds(&self, attribute: Attribute) -> Holding {
-        if ATTRIBUTES.contains(&attribute) { Holding::Whole } else { Holding::Not }
+        Holding::among(&ATTRIBUTES, attribute)
     }
 
     fn holds_further(&self, further: Further) -> bool {

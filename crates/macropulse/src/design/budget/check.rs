@@ -141,11 +141,12 @@ impl Check<'_> {
 
     /// Width of the source that an eye sees, m; 0 for a point.
     fn source(&self, safety: &SafetyFile, parts: &Parts) -> Result<f64, Error> {
-        let is_flash = matches!(parts.scan.model().beams(), Beams::Flood(_));
-        match safety.extended_source {
-            false => Ok(0.0),
-            true if is_flash => Ok(parts.light.beam_diameter),
-            true => self.refuse(
+        if !safety.extended_source {
+            return Ok(0.0);
+        }
+        match parts.scan.model().beams() {
+            Beams::Flood(_) => Ok(parts.light.beam_diameter),
+            Beams::Lines(_) | Beams::Scattered(_) => self.refuse(
                 "safety.extended_source",
                 "must be false, as only [scan.flash] spreads its light from its source on: a beam looks like a point",
             ),

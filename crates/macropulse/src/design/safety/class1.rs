@@ -9,7 +9,7 @@ pub const TELESCOPE: f64 = 2.0;
 /// Angle, mrad, below which a source is a point on the retina, α_min.
 const POINT: f64 = 1.5;
 
-/// Angle, mrad, above which a source grows no more dangerous, the largest α_max.
+/// The largest α_max, mrad, which is that of exposures of a quarter of a second and longer.
 const LARGE: f64 = 100.0;
 
 /// How many times nearer a source seems behind a telescope.
@@ -195,7 +195,7 @@ impl Class1 {
     }
 }
 
-/// The largest source, mrad, whose width raises the limit of an exposure of `duration` t seconds, α_max.
+/// α_max, mrad: light from a larger part of a source does not count in an exposure of `duration` t seconds.
 fn largest(duration: f64) -> f64 {
     match duration {
         t if t < 625e-6 => 5.0,
