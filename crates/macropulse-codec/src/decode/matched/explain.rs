@@ -10,7 +10,6 @@ use crate::code::Codebook;
 use crate::decode::belief::{self, Hypothesis, Marks, Prior};
 use crate::decode::field::{self, Field};
 use crate::decode::{Correlation, Receiver};
-use crate::kernels::places_of;
 use crate::{ShotLog, Ticks};
 
 /// The odds of one shot at many lags, by the [rule of belief](belief), in nats.
@@ -93,10 +92,8 @@ pub(in crate::decode) fn odds(
     };
     let expected = Neighbours::of(log).expected_lags(shot, lag_of);
     let prior = Prior::new(sent.reach(), &expected);
-    let mut places = Vec::new();
-    places_of(sent.word(shot), sent.lit_bits(shot), &mut places);
     let (gate, threshold) = (residual.gate(shot), belief::threshold(correlation.false_alarm));
-    let peak = |lag: i64| residual.peak(&gate, lag, &places, &prior);
+    let peak = |lag: i64| residual.peak(&gate, lag, &prior);
     let peaks: Vec<Peak> = question.lags.iter().copied().map(peak).collect();
     let evidence = peaks.iter().map(|peak| peak.evidence.max(0.0) as f32).collect();
     let best = match question.is_accepted {
@@ -107,7 +104,7 @@ pub(in crate::decode) fn odds(
     // If no lag has evidence, the best one is that with most marks.
     let best = if best.odds.is_finite() { best } else { peak(own.lag) };
     let has_label = sent.bits_of_payload() > 1;
-    let contradiction = has_label.then(|| residual.contradiction(&gate, best.lag, &places, &prior));
+    let contradiction = has_label.then(|| residual.contradiction(&gate, best.lag, &prior));
     Some(Odds {
         evidence,
         reach: sent.reach(),

@@ -29,6 +29,7 @@ mod odds;
 mod pace;
 mod reference;
 mod sent;
+mod spacing;
 #[cfg(test)]
 mod tests;
 mod track;

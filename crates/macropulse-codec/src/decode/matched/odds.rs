@@ -64,7 +64,6 @@ impl Band<'_> {
         if self.sent.bits(shot).shared == 0 {
             return Marks { lit: detection.count, of };
         }
-        self.lay_out(shot);
         Marks { lit: self.marks_with_ticks(shot, detection.lag), of }
     }
 

@@ -242,7 +242,7 @@ impl<'a> Reference<'a> {
     /// The contradiction of the label of `shot` at `lag`.
     fn against(&self, shot: usize, lag: i64, prior: &Prior) -> f64 {
         let gate = self.residual.gate(shot);
-        self.residual.contradiction(&gate, lag, self.search.places(), prior)
+        self.residual.contradiction(&gate, lag, prior)
     }
 
     /// Takes light of `shot` at `lag` for a return on trial. The result restores the state before.

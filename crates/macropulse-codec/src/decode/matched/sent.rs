@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 use std::ops::Range;
 
 use super::chance::BY_CHANCE;
+use super::spacing::{crowded, crowding, shared};
 use super::track::NEAREST_SIDE;
 use crate::ShotLog;
 use crate::code::{CodeWord, Codebook, Family, Payload};
@@ -149,6 +150,9 @@ pub(super) struct Bits {
     pub ends: [(u32, Pattern); 2],
     /// Marks that a tick may count for besides an earlier one.
     pub shared: u32,
+    /// The marks whose ticks can be those of no other mark, and the ticks from the start of the word to all others.
+    alone: Pattern,
+    crowded: Vec<u32>,
     /// How far other marks of the word are from a mark, and from what share of them, as far as their
     /// ticks may be counted with its own.
     pub neighbours: Vec<(i64, f64)>,
@@ -237,8 +241,13 @@ impl<'a> Sent<'a> {
                 of_end(&|mark| first.is_some_and(|first| i64::from(mark - first) < NEAREST_SIDE)),
                 of_end(&|mark| last.is_some_and(|last| i64::from(last - mark) < NEAREST_SIDE)),
             ];
+            let crowded = crowded(word, chips);
+            let in_ticks = |mark: &u16| scale * u32::from(*mark);
+            let alone = word.marks.iter().filter(|mark| !crowded.contains(mark));
             Bits {
                 shared: shared(word, chips),
+                alone: Pattern::new(alone.map(|mark| in_ticks(mark) as usize), 1),
+                crowded: crowded.iter().map(in_ticks).collect(),
                 ends,
                 pattern: pattern(1),
                 cancelled: pattern(cancelled),
@@ -383,17 +392,20 @@ impl<'a> Sent<'a> {
         start..start + self.takes_up()
     }
 
-    /// Marks that are found `lit` at these `places` behind tick `start`, where each of the `ticks` counts for one of
-    /// them: the earliest that it may be. The places ascend.
+    /// Marks of `shot` that are found `lit` if its light begins at tick `start`, where each of the `ticks` counts for one
+    /// of them: the earliest that it may be.
     pub fn marks_with_ticks(
         &self,
         lit: &Timeline,
         ticks: &Timeline,
+        shot: usize,
         start: i64,
-        places: &[u32],
     ) -> u32 {
-        let (mut count, mut free) = (0, start);
-        let places = places.iter().map(|place| start + i64::from(*place));
+        let (bits, lit_bits) = (self.bits(shot), self.lit_bits(shot));
+        let (mut count, mut free) = (lit.lit_in_all(start, lit_bits, &bits.alone), start);
+        let places =
+            lit_bits.iter().flat_map(|bit| bits.crowded.iter().map(move |mark| bit + mark));
+        let places = places.map(|place| start + i64::from(place));
         for first in places.filter(|place| lit.has(*place)) {
             let tick = ticks.next_lit(first.max(free)..first + i64::from(self.width));
             (count, free) = tick.map_or((count, free), |tick| (count + 1, tick + 1));
@@ -462,35 +474,5 @@ impl<'a> Sent<'a> {
     /// their light must not pass for that of a bit that should be dark.
     pub fn wants_further(&self) -> bool {
         self.receiver.returns > 1 || self.receiver.pick != Pick::Strongest
-    }
-}
-
-/// Most marks in any `chips` chips of `word`, or of two in a row.
-fn crowding(word: &CodeWord, chips: u32) -> u32 {
-    let once = word.marks.iter().map(|&mark| u32::from(mark));
-    let marks: Vec<u32> = once.clone().chain(once.map(|mark| mark + word.length)).collect();
-    let within = |first: usize| {
-        marks[first..].iter().take_while(|&&mark| mark < marks[first] + chips).count() as u32
-    };
-    (0..word.marks.len()).map(within).max().unwrap_or(1)
-}
-
-/// Marks of `word` less than `chips` chips behind another one, be it of the same word before.
-fn shared(word: &CodeWord, chips: u32) -> u32 {
-    let marks = word.marks.iter().map(|&mark| u32::from(mark));
-    let before = word.marks.last().map(|&mark| u32::from(mark).wrapping_sub(word.length));
-    let pairs = before.into_iter().chain(marks.clone()).zip(marks);
-    pairs.filter(|(before, mark)| mark.wrapping_sub(*before) < chips).count() as u32
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_tick_counts_for_all_marks_it_may_be() {
-        let word = CodeWord { length: 20, marks: vec![0, 5, 6, 8, 19] };
-        assert_eq!([1, 2, 3, 4, 8, 9].map(|chips| crowding(&word, chips)), [1, 2, 2, 3, 4, 4]);
-        assert_eq!(crowding(&CodeWord { length: 20, marks: vec![] }, 5), 1);
     }
 }

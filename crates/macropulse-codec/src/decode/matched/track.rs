@@ -133,14 +133,26 @@ impl Band<'_> {
         let sides = sides.flat_map(|side| [middle - side * BLOCK, middle + side * BLOCK]);
         let (bounds, first) =
             self.bounds(shot, middle - BLOCK / 2 - SIDES * BLOCK, detection.count);
-        let may_hold = |side: &i64| {
-            let begin = (side - BLOCK / 2 - first) / COARSE as i64;
-            let among = below(begin + BLOCK / COARSE as i64 + 1, bounds, true);
-            !is_dark(&below(begin, among, false))
-        };
+        let may_hold = |side: &i64| may_hold(bounds, side - BLOCK / 2 - first);
         let of = |peak: &Detection| (peak.count, std::cmp::Reverse(peak.lag));
         let peaks = sides.filter(may_hold).filter_map(|side| self.best_in_block(shot, side));
         peaks.max_by_key(of).filter(|peak| of(peak) > of(&detection))
+    }
+
+    /// Leaves out those of the blocks around `middles` in which nowhere `least` marks of `shot` are found, as far as the
+    /// picture tells; sorts the others.
+    pub(super) fn leave_out_fewer(&mut self, shot: usize, middles: &mut Vec<i64>, least: u32) {
+        middles.sort_unstable();
+        let mut seen: Option<([u64; NARROW], i64)> = None;
+        middles.retain(|middle| {
+            let begin = middle - BLOCK / 2;
+            let is_seen =
+                |(_, first): &([u64; NARROW], i64)| begin + BLOCK <= first + BLOCK * COARSE as i64;
+            let (bounds, first) =
+                seen.filter(is_seen).unwrap_or_else(|| self.bounds(shot, begin, least));
+            seen = Some((bounds, first));
+            may_hold(bounds, begin - first)
+        });
     }
 
     /// Returns bits for groups of eight lags, lit if `least` marks of `shot` may be found at any of the
@@ -243,6 +255,13 @@ impl Band<'_> {
             found >= self.chance.at_end.least(*marks, density)
         })
     }
+}
+
+/// True if `bounds`, bits for groups of eight lags, are lit for any of the lags of a block that begins at `begin`.
+fn may_hold(bounds: [u64; NARROW], begin: i64) -> bool {
+    let group = begin / COARSE as i64;
+    let among = below(group + BLOCK / COARSE as i64 + 1, bounds, true);
+    !is_dark(&below(group, among, false))
 }
 
 /// Which of the `lags` are lit, ascending.

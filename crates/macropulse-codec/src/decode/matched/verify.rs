@@ -98,20 +98,21 @@ impl Band<'_> {
         let expected = self.expected_lags(shot);
         let is_near = |lag: i64, other: i64| lag.abs_diff(other) < NEAREST_SIDE as u64;
         let is_alone = found.margin > 1 + twice;
-        if is_alone && expected.iter().all(|lag| is_near(*lag, found.lag)) {
-            return;
-        }
-        let mut middles = vec![found.lag];
+        let enough = found.count.saturating_sub(1 + twice).max(1);
+        let mut middles: Vec<i64> = Vec::new();
         for lag in &expected {
-            if !middles.iter().any(|middle| is_near(*middle, *lag)) {
+            if !is_near(*lag, found.lag) && !middles.iter().any(|middle| is_near(*middle, *lag)) {
                 middles.push(*lag);
             }
         }
-        self.lay_out(shot);
+        self.leave_out_fewer(shot, &mut middles, enough);
+        if is_alone && middles.is_empty() {
+            return;
+        }
+        middles.push(found.lag);
         let prior = Prior::new(self.sent.reach(), &expected);
         let marks = |lit: u32| Marks { lit, of: weight };
         let around = self.light_about(shot, found.lag, found.count);
-        let enough = found.count.saturating_sub(1 + twice).max(1);
         let mut best = (f64::NEG_INFINITY, found.lag, found.count);
         for middle in middles {
             if !self.may_have(shot, middle, enough) || self.best_in_block(shot, middle).is_none() {
@@ -153,11 +154,10 @@ impl Band<'_> {
         ticks >= self.sent.ticks_of(shot, marks)
     }
 
-    /// Marks of `shot`, which are at hand, found at `lag`, where each tick counts for one of them: the
-    /// earliest that it may be.
+    /// Marks of `shot` found at `lag`, where each tick counts for one of them: the earliest that it may be.
     pub(super) fn marks_with_ticks(&self, shot: usize, lag: i64) -> u32 {
         let (sent, seen, lit) = (self.sent, self.field.seen(), self.field.lit());
-        sent.marks_with_ticks(lit, seen, sent.fired[shot] + lag, &self.marks)
+        sent.marks_with_ticks(lit, seen, shot, sent.fired[shot] + lag)
     }
 
     /// Why a `surface` of `shot` gives no return, if it does not.

@@ -199,20 +199,19 @@ impl<'a> Residual<'a> {
         whole + of.count(span.start..tick(first)) + of.count(tick(end)..span.end)
     }
 
-    /// The marks of a shot at `lag` that no return claims, and the light about them. `places` are the ticks from the
-    /// start of its macropulse to each mark, ascending.
+    /// The marks of a shot at `lag` that no return claims, and the light about them.
     ///
     /// A tick is one piece of evidence: where it may be one of two marks it counts for one, the earliest. As all
     /// marks are looked for in equally many ticks, no other choice gives more marks a tick. All other ticks are
     /// surroundings, but where each photon makes an event of its own those about the marks tell nothing.
-    pub fn look(&self, gate: &Gate, lag: i64, places: &[u32]) -> (Marks, Surroundings) {
+    pub fn look(&self, gate: &Gate, lag: i64) -> (Marks, Surroundings) {
         let (sent, shot, light) = (self.sent, gate.shot, self.sent.light(gate.shot, lag));
         let (bits, lit_bits) = (sent.bits(shot), sent.lit_bits(shot));
         let count = |of: &Timeline| of.lit_in_all(light.start, lit_bits, &bits.pattern);
         let of = sent.weight(shot) - count(&self.claimed);
         let lit = match bits.shared {
             0 => count(&self.lit),
-            _ => sent.marks_with_ticks(&self.lit, &self.left, light.start, places),
+            _ => sent.marks_with_ticks(&self.lit, &self.left, shot, light.start),
         };
         let most = sent.ticks_at_most(shot, lit);
         let own = match sent.correlation.photons_apart {
@@ -229,8 +228,8 @@ impl<'a> Residual<'a> {
     }
 
     /// Returns the evidence for light of a shot at `lag`, and its odds.
-    pub fn peak(&self, gate: &Gate, lag: i64, places: &[u32], prior: &Prior) -> Peak {
-        let (marks, around) = self.look(gate, lag, places);
+    pub fn peak(&self, gate: &Gate, lag: i64, prior: &Prior) -> Peak {
+        let (marks, around) = self.look(gate, lag);
         let evidence = evidence(marks, &around);
         Peak { lag, marks, evidence, odds: evidence + prior.at(lag) }
     }
@@ -247,11 +246,11 @@ impl<'a> Residual<'a> {
     }
 
     /// The [contradiction](belief::contradiction) of the label of a shot at `lag`.
-    pub fn contradiction(&self, gate: &Gate, lag: i64, places: &[u32], prior: &Prior) -> f64 {
+    pub fn contradiction(&self, gate: &Gate, lag: i64, prior: &Prior) -> f64 {
         let (sent, shot) = (self.sent, gate.shot);
         let in_bits = |bits: &[u32]| self.in_bits(shot, lag, bits);
         let (lit, dark) = (in_bits(sent.lit_bits(shot)), in_bits(sent.dark_bits(shot)));
-        let (_, around) = self.look(gate, lag, places);
+        let (_, around) = self.look(gate, lag);
         belief::contradiction(&lit, &dark, &around, prior.expected(lag))
     }
 

@@ -16,7 +16,7 @@ use super::residual::{Gate, Residual, Sums, first_bits};
 use crate::decode::belief::{Marks, Prior, evidence};
 use crate::decode::matched::track::below;
 use crate::decode::threshold::fewest;
-use crate::kernels::{Counts, WIDE, and, is_dark, places_of};
+use crate::kernels::{Counts, WIDE, and, is_dark};
 
 /// Lags that are counted at once.
 pub(super) const BLOCK: i64 = 64 * WIDE as i64;
@@ -53,8 +53,6 @@ impl Peak {
 /// Memory kept from search to search.
 #[derive(Default)]
 pub(super) struct Search {
-    /// Ticks from the start of a macropulse to each of its marks.
-    places: Vec<u32>,
     lit: Counts<WIDE>,
     open: Counts<WIDE>,
     sums: Sums,
@@ -127,9 +125,7 @@ impl Search {
         (likely, below): (i64, f64),
     ) -> Vec<Peak> {
         let Question { shot, prior, least, .. } = *question;
-        let sent = residual.sent;
-        places_of(sent.word(shot), sent.lit_bits(shot), &mut self.places);
-        let first = residual.peak(&residual.gate(shot), likely, &self.places, prior);
+        let first = residual.peak(&residual.gate(shot), likely, prior);
         let mut least = least.max(first.odds - below);
         let mut all: Vec<Peak> = Vec::new();
         self.scan(residual, &Question { least, ..question.clone() }, |peak| {
@@ -151,7 +147,6 @@ impl Search {
         let &Question { shot, ref lags, prior, mut least } = question;
         let (sent, gate) = (residual.sent, residual.gate(shot));
         let lags = lags.start.max(prior.lags().start)..lags.end.min(prior.lags().end);
-        places_of(sent.word(shot), sent.lit_bits(shot), &mut self.places);
         if gate.ticks == 0 {
             return;
         }
@@ -185,7 +180,7 @@ impl Search {
                     let Some((at, _)) = self.lit.highest(hits) else { break };
                     hits[at as usize / 64] &= !(1 << (at % 64));
                     let lag = first + i64::from(at);
-                    let peak = residual.peak(&gate, lag, &self.places, prior);
+                    let peak = residual.peak(&gate, lag, prior);
                     if peak.odds >= least {
                         let before = least;
                         least = visit(peak);
@@ -255,10 +250,5 @@ impl Search {
         }
         self.known.insert(asked, fewest);
         fewest
-    }
-
-    /// Ticks from the start of the macropulse to each mark, of the shot that was asked about last.
-    pub fn places(&self) -> &[u32] {
-        &self.places
     }
 }

@@ -37,6 +37,37 @@ proptest! {
             prop_assert_eq!(found.map(|found| (found.count, -found.lag)), expected);
         }
     }
+
+    /// Blocks that are left out have too few marks at every lag; marks with ticks of their own are those of a
+    /// matching, mark by mark.
+    #[test]
+    fn blocks_left_out_have_fewer_marks_and_ticks_count_for_one_mark(
+        book in 0..8_usize,
+        missed in 0..80_u32,
+        false_ticks in prop_oneof![Just(0), 1..120_u32],
+        jitter in prop_oneof![Just(0.0), 0.1..6.0_f64],
+        scale in 1..9_u32,
+        least in 1..30_u32,
+        middles in prop::collection::vec(100..4900_i64, 1..6),
+        seed in 0..u64::MAX,
+    ) {
+        let crowd = Crowd::new(book, (missed, false_ticks), (jitter, scale), seed);
+        let (ticks, sent) = (&crowd.ticks, crowd.sent());
+        let mut band = crowd.band(&sent);
+        for shot in 4..8 {
+            let marks = counter(&sent, &ticks.tick, shot);
+            let mut left = middles.clone();
+            band.leave_out_fewer(shot, &mut left, least);
+            for middle in middles.iter().filter(|middle| !left.contains(middle)) {
+                let most = (middle - BLOCK / 2..middle + BLOCK / 2).map(&marks).max();
+                prop_assert!(most < Some(least), "{most:?} about {middle}");
+            }
+            for lag in &middles {
+                let expected = marks_with_ticks(&sent, &ticks.tick, shot, *lag);
+                prop_assert_eq!(band.marks_with_ticks(shot, *lag), expected);
+            }
+        }
+    }
 }
 
 proptest! {
