@@ -72,7 +72,7 @@ fn dark() -> Scene {
 /// ranges that differ from shot to shot.
 fn trees() -> Scene {
     let mut state = 1_u64;
-    // Even numbers between −1 and 1 (Knuth's linear congruential generator).
+    // Uniform numbers between −1 and 1 (Knuth's linear congruential generator).
     let mut draw = || {
         state =
             state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

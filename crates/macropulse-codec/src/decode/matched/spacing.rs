@@ -12,33 +12,26 @@ pub(super) fn crowding(word: &CodeWord, chips: u32) -> u32 {
     (0..word.marks.len()).map(within).max().unwrap_or(1)
 }
 
-/// Marks of `word` less than `chips` chips behind another one, be it of the same word before.
-pub(super) fn shared(word: &CodeWord, chips: u32) -> u32 {
+/// Chips from the mark before to each mark of `word`; to its first one from the last of the same word before.
+fn gaps(word: &CodeWord) -> Vec<u32> {
     let marks = word.marks.iter().map(|&mark| u32::from(mark));
     let before = word.marks.last().map(|&mark| u32::from(mark).wrapping_sub(word.length));
-    let pairs = before.into_iter().chain(marks.clone()).zip(marks);
-    pairs.filter(|(before, mark)| mark.wrapping_sub(*before) < chips).count() as u32
+    let before = before.into_iter().chain(marks.clone());
+    before.zip(marks).map(|(before, mark)| mark.wrapping_sub(before)).collect()
+}
+
+/// Marks of `word` less than `chips` chips behind another one, be it of the same word before.
+pub(super) fn shared(word: &CodeWord, chips: u32) -> u32 {
+    gaps(word).iter().filter(|gap| **gap < chips).count() as u32
 }
 
 /// Marks of `word` less than `chips` chips from another one, be it of the same word before or behind.
 pub(super) fn crowded(word: &CodeWord, chips: u32) -> Vec<u16> {
-    let marks = &word.marks;
-    let is_near = |one: u16, next: u16, between: u32| {
-        (u32::from(next) + between).wrapping_sub(u32::from(one)) < chips
-    };
-    let last = marks.len().wrapping_sub(1);
-    let is_crowded = |at: &usize| {
-        let before = match at {
-            0 => is_near(marks[last], marks[0], word.length),
-            at => is_near(marks[at - 1], marks[*at], 0),
-        };
-        let behind = match *at == last {
-            true => is_near(marks[last], marks[0], word.length),
-            false => is_near(marks[*at], marks[at + 1], 0),
-        };
-        before || behind
-    };
-    (0..marks.len()).filter(is_crowded).map(|at| marks[at]).collect()
+    let before = gaps(word);
+    let behind = before.iter().cycle().skip(1);
+    let nearest = before.iter().zip(behind).map(|(before, behind)| before.min(behind));
+    let marks = word.marks.iter().zip(nearest).filter(|(_, gap)| **gap < chips);
+    marks.map(|(mark, _)| *mark).collect()
 }
 
 #[cfg(test)]

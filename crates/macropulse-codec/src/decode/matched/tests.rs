@@ -4,6 +4,8 @@ mod cancelled;
 mod shortcuts;
 mod surfaces;
 
+use std::ops::Range;
+
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use rand_chacha::ChaCha8Rng;
@@ -203,13 +205,22 @@ struct Crowd {
     receiver: Receiver,
 }
 
+/// What a [`Crowd`] is made of: number of its codebook, marks missed of 100 and false ticks in 1000 places, jitter in
+/// ticks and ticks a chip, seed.
+type Conditions = (usize, (u32, u32), (f64, u32), u64);
+
+/// Any conditions with marks `missed` and `jitter` in these ranges; false ticks and jitter may be none.
+fn conditions(
+    missed: Range<u32>,
+    jitter: Range<f64>,
+    scale: Range<u32>,
+) -> impl Strategy<Value = Conditions> {
+    let light = (missed, prop_oneof![Just(0), 1..120_u32]);
+    (0..8_usize, light, (prop_oneof![Just(0.0), jitter], scale), any::<u64>())
+}
+
 impl Crowd {
-    fn new(
-        book: usize,
-        (missed, false_ticks): (u32, u32),
-        (jitter, scale): (f64, u32),
-        seed: u64,
-    ) -> Self {
+    fn new((book, (missed, false_ticks), (jitter, scale), seed): Conditions) -> Self {
         let sensor = Sensor::crowded(books().remove(book));
         let log = sensor.log(12);
         let weather = Weather { missed, false_ticks, late: 20, roughness: 300, panes: 20 };
@@ -300,16 +311,11 @@ proptest! {
     /// of all ticks and of those left over.
     #[test]
     fn a_maximum_is_the_exhaustive_one(
-        book in 0..8_usize,
-        missed in 0..70_u32,
-        false_ticks in prop_oneof![Just(0), 1..120_u32],
-        jitter in prop_oneof![Just(0.0), 0.1..3.0_f64],
-        scale in 1..4_u32,
+        conditions in conditions(0..70, 0.1..3.0, 1..4),
         least in 1..40_u32,
         from in 0..3000_i64,
-        seed in 0..u64::MAX,
     ) {
-        let crowd = Crowd::new(book, (missed, false_ticks), (jitter, scale), seed);
+        let crowd = Crowd::new(conditions);
         let (Crowd { sensor, ticks, surfaces, .. }, sent) = (&crowd, crowd.sent());
         let mut band = crowd.band(&sent);
         for shot in 4..8 {
@@ -324,7 +330,7 @@ proptest! {
         band.cancel(5, lag);
         let farther = i64::from(sent.width / 2);
         let own: Vec<i64> = marks_of(&sent, 5).iter().map(|&mark| {
-            sent.fired[5] + lag + i64::from(scale) * i64::from(mark)
+            sent.fired[5] + lag + i64::from(sent.correlation.ticks_per_chip) * i64::from(mark)
         }).collect();
         let is_left = |tick: &u32| !own.iter().any(|mark| {
             (mark - farther..mark + i64::from(sent.width) + farther).contains(&i64::from(*tick))

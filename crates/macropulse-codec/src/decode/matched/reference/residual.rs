@@ -207,12 +207,9 @@ impl<'a> Residual<'a> {
     pub fn look(&self, gate: &Gate, lag: i64) -> (Marks, Surroundings) {
         let (sent, shot, light) = (self.sent, gate.shot, self.sent.light(gate.shot, lag));
         let (bits, lit_bits) = (sent.bits(shot), sent.lit_bits(shot));
-        let count = |of: &Timeline| of.lit_in_all(light.start, lit_bits, &bits.pattern);
-        let of = sent.weight(shot) - count(&self.claimed);
-        let lit = match bits.shared {
-            0 => count(&self.lit),
-            _ => sent.marks_with_ticks(&self.lit, &self.left, shot, light.start),
-        };
+        let claimed = self.claimed.lit_in_all(light.start, lit_bits, &bits.pattern);
+        let of = sent.weight(shot) - claimed;
+        let lit = sent.marks_with_ticks(&self.lit, &self.left, shot, light.start);
         let most = sent.ticks_at_most(shot, lit);
         let own = match sent.correlation.photons_apart {
             true => {

@@ -13,16 +13,11 @@ proptest! {
     /// The highest peak beside a block is that of every lag with every mark, whichever blocks are refused.
     #[test]
     fn the_highest_peak_beside_a_block_is_the_exhaustive_one(
-        book in 0..8_usize,
-        missed in 0..80_u32,
-        false_ticks in prop_oneof![Just(0), 1..120_u32],
-        jitter in prop_oneof![Just(0.0), 0.1..3.0_f64],
-        scale in 1..9_u32,
+        conditions in conditions(0..80, 0.1..3.0, 1..9),
         count in 0..30_u32,
         middle in 100..4900_i64,
-        seed in 0..u64::MAX,
     ) {
-        let crowd = Crowd::new(book, (missed, false_ticks), (jitter, scale), seed);
+        let crowd = Crowd::new(conditions);
         let (ticks, sent) = (&crowd.ticks, crowd.sent());
         let mut band = crowd.band(&sent);
         for shot in 4..8 {
@@ -42,16 +37,11 @@ proptest! {
     /// matching, mark by mark.
     #[test]
     fn blocks_left_out_have_fewer_marks_and_ticks_count_for_one_mark(
-        book in 0..8_usize,
-        missed in 0..80_u32,
-        false_ticks in prop_oneof![Just(0), 1..120_u32],
-        jitter in prop_oneof![Just(0.0), 0.1..6.0_f64],
-        scale in 1..9_u32,
+        conditions in conditions(0..80, 0.1..6.0, 1..9),
         least in 1..30_u32,
         middles in prop::collection::vec(100..4900_i64, 1..6),
-        seed in 0..u64::MAX,
     ) {
-        let crowd = Crowd::new(book, (missed, false_ticks), (jitter, scale), seed);
+        let crowd = Crowd::new(conditions);
         let (ticks, sent) = (&crowd.ticks, crowd.sent());
         let mut band = crowd.band(&sent);
         for shot in 4..8 {
@@ -82,7 +72,7 @@ proptest! {
         bits_away in -3..4_i64,
         seed in 0..u64::MAX,
     ) {
-        let crowd = Crowd::new(book, (missed, false_ticks), (jitter, 1), seed);
+        let crowd = Crowd::new((book, (missed, false_ticks), (jitter, 1), seed));
         let sent = crowd.sent();
         let mut band = crowd.band(&sent);
         for shot in 4..8 {
