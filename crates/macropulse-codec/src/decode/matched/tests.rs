@@ -205,7 +205,7 @@ struct Crowd {
     receiver: Receiver,
 }
 
-/// What a [`Crowd`] is made of: number of its codebook, marks missed of 100 and false ticks in 1000 places, jitter in
+/// Conditions of a [`Crowd`]: number of its codebook, marks missed of 100 and false ticks in 1000 places, jitter in
 /// ticks and ticks a chip, seed.
 type Conditions = (usize, (u32, u32), (f64, u32), u64);
 
