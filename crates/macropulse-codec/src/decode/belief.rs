@@ -65,6 +65,11 @@ impl Surroundings {
     fn mean(&self) -> f64 {
         (self.lit + 1.0) / (self.places + self.density.recip())
     }
+
+    /// The second parameter of the distribution that the places leave the density, m − t + b.
+    fn dark(&self) -> f64 {
+        (self.places - self.lit).max(0.0) + (self.density.recip() - 1.0).max(1.0)
+    }
 }
 
 /// Evidence for light at the `marks`, in nats: the logarithm of a Bayes factor.
@@ -112,8 +117,8 @@ pub(super) fn evidence_at(marks: Marks, density: f64) -> f64 {
 /// The logarithm of the Bayes factor, be it for light or against it.
 fn log_factor(marks: Marks, around: &Surroundings) -> f64 {
     let [k, n] = [marks.lit, marks.of].map(f64::from);
-    let (t, m) = (around.lit, around.places);
-    let dark = (m - t).max(0.0) + (around.density.recip() - 1.0).max(1.0);
+    let t = around.lit;
+    let dark = around.dark();
     let beside = log_gamma(t + 1.0) + log_gamma(dark) - log_gamma(t + dark + 1.0);
     let chance = log_gamma(k + t + 1.0) + log_gamma(n - k + dark) - log_gamma(n + t + dark + 1.0);
     log_light(k, n) + beside - chance
@@ -122,17 +127,30 @@ fn log_factor(marks: Marks, around: &Surroundings) -> f64 {
 /// ln S(k, n), see [`evidence`].
 fn log_light(k: f64, n: f64) -> f64 {
     static OF_WHOLE: LazyLock<[f64; IN_TABLE]> =
-        LazyLock::new(|| std::array::from_fn(|whole| log(harmonic(whole as f64) - 1.0)));
+        LazyLock::new(|| std::array::from_fn(|whole| log_of_all(whole as f64)));
+    static SUMS: LazyLock<[f64; IN_TABLE]> =
+        LazyLock::new(|| std::array::from_fn(|whole| log_sum(whole as f64)));
     if n < 2.0 {
         return 0.0;
     }
     if k < 2.0 {
         return f64::NEG_INFINITY;
     }
-    let log_sum = OF_WHOLE.get(n as usize).copied().unwrap_or_else(|| log(harmonic(n) - 1.0));
+    if k >= n {
+        return OF_WHOLE.get(n as usize).copied().unwrap_or_else(|| log_of_all(n));
+    }
     let one_way = log_gamma(k) + log_gamma(n - k + 1.0) - log_gamma(n + 1.0);
-    let faint = one_way - log_sum + log(1.0 - BRIGHT);
-    if k < n { faint } else { log(BRIGHT + exp(faint)) }
+    one_way - SUMS.get(n as usize).copied().unwrap_or_else(|| log_sum(n))
+}
+
+/// ln S(n, n).
+fn log_of_all(n: f64) -> f64 {
+    log(BRIGHT + exp(-log(n) - log_sum(n)))
+}
+
+/// ln((Hₙ − 1)/(1 − w)), the sum that S is divided by.
+fn log_sum(n: f64) -> f64 {
+    log((harmonic(n) - 1.0) / (1.0 - BRIGHT))
 }
 
 /// Whole numbers below this one have their ln Γ and ln H in a table.
@@ -155,6 +173,15 @@ fn log_gamma(x: f64) -> f64 {
     let (inverse, half_log_tau) = (x.recip(), 0.918_938_533_204_672_7);
     let rest = inverse * (1.0 / 12.0 - inverse * inverse / 360.0);
     (x - 0.5) * log(x) - x + half_log_tau + rest
+}
+
+/// The digamma function ψ(x), the derivative of ln Γ, for x > 0, to 10⁻⁷.
+fn digamma(x: f64) -> f64 {
+    if x < 6.0 {
+        return digamma(x + 1.0) - x.recip();
+    }
+    let square = (x * x).recip();
+    log(x) - 0.5 / x - square * (1.0 / 12.0 - square / 120.0)
 }
 
 /// The harmonic number Hₙ = 1 + ½ + … + 1/n of a whole `n`, to 10⁻¹¹; from 32 on by Euler and Maclaurin.
@@ -270,6 +297,40 @@ pub(super) fn contradiction(
         return best;
     }
     best - evidence(own, around) - expected - (lit.len() + dark.len()) as f64 * LN_2
+}
+
+/// A bound of [`contradiction`] at little cost, which it does not exceed. Each bit has `in_bit` marks, and `found` says
+/// how many of them are lit in each bit; `own` are the marks of the lit bits together.
+///
+/// The marks of another label are more or fewer by Δk lit and Δj dark ones. Their probability under chance is that of
+/// the own marks times the mean of d^Δk·(1 − d)^Δj, where d has the distribution that all marks and places leave it,
+/// Beta(α, β). By Jensen's inequality its logarithm is at least
+///
+/// > Δk·[ψ(α) − ψ(α + β)] + Δj·[ψ(β) − ψ(α + β)].
+pub(super) fn contradiction_at_most(
+    found: &mut [u32],
+    in_bit: u32,
+    own: Marks,
+    around: &Surroundings,
+    expected: f64,
+) -> f64 {
+    let [k, n] = [own.lit, own.of].map(f64::from);
+    let light = log_light(k, n);
+    if k <= n * around.mean() || light == f64::NEG_INFINITY {
+        return f64::INFINITY;
+    }
+    let (lit, dark) = (k + around.lit + 1.0, n - k + around.dark());
+    let all = digamma(lit + dark);
+    let (per_lit, per_dark) = (digamma(lit) - all, digamma(dark) - all);
+    found.sort_unstable_by(|one, other| other.cmp(one));
+    let (mut sum, mut best) = ([0.0; 2], f64::NEG_INFINITY);
+    for bit in &*found {
+        let [lit, of] = [sum[0] + f64::from(*bit), sum[1] + f64::from(in_bit)];
+        let more = (lit - k) * per_lit + (of - lit - (n - k)) * per_dark;
+        best = f64::max(best, log_light(lit, of) - more);
+        sum = [lit, of];
+    }
+    best - light - expected - found.len() as f64 * LN_2
 }
 
 /// Light of `shot` that may come after `lag`.

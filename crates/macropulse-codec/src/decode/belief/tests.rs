@@ -177,6 +177,37 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(3), ..ProptestConfig::with_cases(2000) })]
+
+    /// The cheap bound of a contradiction is never below it, nor below that of the same bits with fewer marks in dark ones.
+    #[test]
+    fn a_contradiction_is_bounded(
+        in_bit in 1..65_u32,
+        shares in prop::collection::vec(0.0..1.3_f64, 1..20),
+        lit_bits in 1..20_usize,
+        places in 1..5000_u32,
+        share in 0.0..1.0_f64,
+        density in 1e-4..0.5_f64,
+    ) {
+        let places = f64::from(places);
+        let around = Surroundings { lit: (share * share * places).floor(), places, density };
+        let found = |share: &f64| (share.min(1.0) * f64::from(in_bit)).round() as u32;
+        let mut found: Vec<u32> = shares.iter().map(found).collect();
+        let bits: Vec<Marks> = found.iter().map(|lit| Marks { lit: *lit, of: in_bit }).collect();
+        let (lit, dark) = bits.split_at(lit_bits.min(bits.len()));
+        let lit_in_all = lit.iter().map(|bit| bit.lit).sum();
+        let own = Marks { lit: lit_in_all, of: in_bit * lit.len() as u32 };
+        let exact = contradiction(lit, dark, &around, 0.5);
+        let bound = contradiction_at_most(&mut found, in_bit, own, &around, 0.5);
+        prop_assert!(bound >= exact - 1e-5, "{bound} {exact}");
+        let fewer = |bit: &Marks| Marks { lit: (f64::from(bit.lit) * share) as u32, ..*bit };
+        let darker: Vec<Marks> = dark.iter().map(fewer).collect();
+        let left = contradiction(lit, &darker, &around, 0.5);
+        prop_assert!(bound >= left - 1e-5, "{bound} {left}");
+    }
+}
+
 /// A payload has 13 bits with 29 marks each, and half the marks of a lit bit are seen. Two lit bits more or
 /// less contradict the label, and its own light does not. Two marks of a bit do not tell.
 #[test]
@@ -196,6 +227,25 @@ fn light_of_another_label_contradicts() {
     let claimed = vec![Marks { lit: 0, of: 0 }; 3];
     assert!(against(&[bits(14, 3), claimed].concat(), &bits(0, 7)) < 0.0);
     assert_eq!(against(&bits(0, 6), &bits(0, 7)), f64::NEG_INFINITY);
+    // Two whole bits of three speak better than all with one mark missed, where chance lights every other place.
+    let dense = Surroundings { lit: 0.0, places: 1.0, density: 0.5 };
+    let lit = [64, 64, 63].map(|lit| Marks { lit, of: 64 });
+    let dark = vec![Marks { lit: 5, of: 64 }; 4];
+    assert!(contradiction(&lit, &dark, &dense, 0.0) > 0.7);
+    assert!(contradiction(&lit, &dark, &around, 0.0) < -4.0);
+}
+
+/// The bound of a contradiction is near it where bits are told: it does not call for the whole rule.
+#[test]
+fn a_whole_label_is_told_at_little_cost() {
+    let around = Surroundings { lit: 5.0, places: 5000.0, density: 1e-3 };
+    let own = Marks { lit: 6 * 27, of: 6 * 29 };
+    let bound = |of_dark: u32| {
+        let mut found = [vec![27; 6], vec![of_dark; 7]].concat();
+        contradiction_at_most(&mut found, 29, own, &around, 0.0)
+    };
+    assert!(bound(0) < 0.0 && bound(3) < 0.0, "{} {}", bound(0), bound(3));
+    assert!(bound(14) > 0.0);
 }
 
 #[test]

@@ -204,9 +204,9 @@ struct Band<'a> {
     in_picture: Vec<u32>,
     search: Search,
     meter: Meter<'a>,
-    /// Memory: the places that returns claim, and the marks found in each bit of a macropulse and in those about it.
+    /// Memory: the places that returns claim, and the marks found in each lit and in each dark bit.
     claimed: Timeline,
-    found_in_bits: Vec<u32>,
+    found_in_bits: [Vec<u32>; 2],
     words: WordsAbout,
     /// The logarithm of the posterior odds from which on a detection is believed.
     threshold: f64,
@@ -276,7 +276,7 @@ impl<'a> Band<'a> {
             search: memory.search,
             meter: Meter::new(sent, memory.photons),
             claimed: memory.claimed,
-            found_in_bits: Vec::new(),
+            found_in_bits: Default::default(),
             words: WordsAbout::default(),
             threshold: belief::threshold(sent.correlation.false_alarm),
             sent,

@@ -201,33 +201,27 @@ impl Band<'_> {
         if sent.bits_of_payload() == 1 {
             return false;
         }
-        let light = sent.light(shot, detection.lag);
-        let (weight, in_word) = (sent.weight(shot), sent.in_word(shot));
+        let start = sent.fired[shot] + detection.lag;
         let around = self.light_about(shot, detection.lag, detection.count);
-        let share = f64::from(detection.count) / f64::from(weight);
-        let fewest = fewest_of_lit_bit(in_word, share, around.lit / around.places);
-        let (pattern, lit_bits) = (&sent.bits(shot).pattern, sent.lit_bits(shot));
-        let marks = |lit: &u32| Marks { lit: *lit, of: in_word };
-        let mut found = std::mem::take(&mut self.found_in_bits);
-        self.field.lit().lit_in_each(light.start, lit_bits, pattern, &mut found);
-        let lit: Vec<Marks> = found.iter().map(marks).collect();
-        let mean = share * f64::from(in_word);
-        let squares: f64 = found.iter().map(|found| (f64::from(*found) - mean).powi(2)).sum();
-        // A label that leaves out the emptier bits gains about half of χ², and is taken only if it gains ln 2 a bit.
-        let most = 2.0 * LN_2 * (sent.bits_of_payload() - 1) as f64 * mean * (1.0 - share);
-        let is_even = found.iter().all(|found| *found >= fewest) && squares <= most;
-        self.field.lit().lit_in_each(light.start, sent.dark_bits(shot), pattern, &mut found);
-        let is_clear = is_even && found.iter().all(|found| *found < fewest);
-        if !is_clear {
-            self.leave_out_explained(shot, detection, &mut found);
+        let (pattern, in_word) = (&sent.bits(shot).pattern, sent.in_word(shot));
+        let [mut lit, mut dark] = std::mem::take(&mut self.found_in_bits);
+        self.field.lit().lit_in_each(start, sent.lit_bits(shot), pattern, &mut lit);
+        self.field.lit().lit_in_each(start, sent.dark_bits(shot), pattern, &mut dark);
+        let own = Marks { lit: lit.iter().sum(), of: sent.weight(shot) };
+        let mut all = [&*lit, &*dark].concat();
+        // No prior is less than half of a uniform one, and no dark bit shows more marks than in all light.
+        let most = belief::contradiction_at_most(&mut all, in_word, own, &around, -LN_2);
+        let mut is_contradicted = most > 0.0;
+        if is_contradicted {
+            self.leave_out_explained(shot, detection, &mut dark);
+            let expected = self.prior(shot).expected(detection.lag);
+            let [lit, dark] = [&lit, &dark].map(|bits| {
+                bits.iter().map(|lit| Marks { lit: *lit, of: in_word }).collect::<Vec<_>>()
+            });
+            is_contradicted = belief::contradiction(&lit, &dark, &around, expected) > 0.0;
         }
-        let dark: Vec<Marks> = found.iter().map(marks).collect();
-        self.found_in_bits = found;
-        if is_clear || is_even && dark.iter().all(|bit| bit.lit < fewest) {
-            return false;
-        }
-        let expected = self.prior(shot).expected(detection.lag);
-        belief::contradiction(&lit, &dark, &around, expected) > 0.0
+        self.found_in_bits = [lit, dark];
+        is_contradicted
     }
 
     /// Takes from the marks `found` in each dark bit of `shot` at `detection` those that returns explain.
@@ -252,18 +246,4 @@ impl Band<'_> {
 /// Whole machine words that hold `span`.
 fn whole_words(span: &Range<i64>) -> Range<i64> {
     span.start.div_euclid(64) * 64..span.end.div_euclid(64) * 64 + 64
-}
-
-/// The fewest marks that make a bit likelier lit than dark. It has `marks` marks, n. A lit bit shows each of them with the
-/// probability q, `share`, a dark one with d, `density`. Both are equally likely with k marks for which
-///
-/// > k·ln(q/d) + (n − k)·ln((1 − q)/(1 − d)) = 0.
-fn fewest_of_lit_bit(marks: u32, share: f64, density: f64) -> u32 {
-    // Neither is known so well.
-    let (share, density) = (share.min(0.999), density + 1e-4);
-    if share <= density {
-        return marks;
-    }
-    let (seen, missed) = (log(share / density), log((1.0 - share) / (1.0 - density)));
-    (-missed * f64::from(marks) / (seen - missed)) as u32 + 1
 }

@@ -65,14 +65,10 @@ proptest! {
 
     /// The verdict on a label is that of plain code, which asks for each place of each bit. 500 cases of four shots.
     fn a_label_is_doubted_as_mark_by_mark(
-        book in 0..8_usize,
-        missed in 0..80_u32,
-        false_ticks in prop_oneof![Just(0), 1..120_u32],
-        jitter in prop_oneof![Just(0.0), 0.1..3.0_f64],
+        conditions in conditions(0..80, 0.1..3.0, 1..9),
         bits_away in -3..4_i64,
-        seed in 0..u64::MAX,
     ) {
-        let crowd = Crowd::new((book, (missed, false_ticks), (jitter, 1), seed));
+        let crowd = Crowd::new(conditions);
         let sent = crowd.sent();
         let mut band = crowd.band(&sent);
         for shot in 4..8 {
@@ -93,10 +89,6 @@ proptest! {
                 .map(|bits| bits.iter().map(in_bit).collect::<Vec<Marks>>());
             let count = lit.iter().map(|bit| bit.lit).sum();
             let around = band.light_about(shot, lag, count);
-            // Such light is never believed, and its label never asked.
-            if belief::evidence(Marks { lit: count, of: sent.weight(shot) }, &around) < 0.0 {
-                continue;
-            }
             let is_contradicted = sent.bits_of_payload() > 1
                 && belief::contradiction(&lit, &dark, &around, 0.0) > 0.0;
             DOUBTED[usize::from(is_contradicted)].fetch_add(1, Ordering::Relaxed);
