@@ -90,7 +90,7 @@ pub(super) fn gather(channel: &Channel, within_fs: i64) -> Vec<Together> {
         channel.order.iter().map(|arrival| *arrival as u32 as usize).collect();
     let whose = |train: usize| (trains.transmitter[train], trains.shot[train], trains.marks[train]);
     let begins = |train: usize| trains.arrives_fs[train];
-    order.sort_by_key(|&train| (whose(train), begins(train)));
+    order.sort_by_cached_key(|&train| (whose(train), begins(train)));
     let mut together = Vec::new();
     let mut rest = order.as_slice();
     while let Some(&first) = rest.first() {

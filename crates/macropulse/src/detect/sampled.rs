@@ -40,9 +40,14 @@ const TOGETHER: f64 = 1.0 / 8.0;
 /// Gaussian in steps of σ/2 is as smooth as one without to 10⁻³⁰.
 const SLICE: f64 = 0.5;
 const SLICES: i32 = 6;
+const ALL_SLICES: usize = 2 * SLICES as usize + 1;
 
 /// Samples that are looked at together for one at the limit.
 const CHUNK: usize = 256;
+
+/// Pulses in a row up to this length, in rms lengths of one, are added together. Over a longer row exponentials leave the
+/// range of numbers.
+const WIDEST_ROW: f64 = 8.0;
 
 /// The pulse of a photon is followed to where it is less than this share of a step of the converter.
 const NEGLIGIBLE: f64 = 1.0 / 16.0;
@@ -60,7 +65,7 @@ pub(super) struct Sampler {
     /// Its height for a single one.
     height: f64,
     /// Share of the light in each slice of a pulse.
-    shares: Vec<f64>,
+    shares: [f64; ALL_SLICES],
     /// Ticks before those wanted that are worked out, too.
     before: i64,
 }
@@ -71,7 +76,8 @@ impl Sampler {
         let tick_fs = design.clock.tick_fs;
         let in_ticks = |time: f64| time * FS_PER_S as f64 / tick_fs as f64;
         let share = |slice: i32| libm::exp(-0.5 * (f64::from(slice) * SLICE).powi(2));
-        let total: f64 = (-SLICES..=SLICES).map(share).sum();
+        let shares: [f64; ALL_SLICES] = std::array::from_fn(|slice| share(slice as i32 - SLICES));
+        let total: f64 = shares.iter().sum();
         let colour = Colour::new(
             |apart| front_end.covariance(apart as f64 * s_from_fs(tick_fs), background),
             front_end.third_cumulant(background),
@@ -85,7 +91,7 @@ impl Sampler {
             tick_fs,
             photon: Gaussian::new(in_ticks(front_end.photon_rms())),
             height: front_end.photon_height(),
-            shares: (-SLICES..=SLICES).map(|slice| share(slice) / total).collect(),
+            shares: shares.map(|share| share / total),
             before: before.ceil() as i64,
         }
     }
@@ -134,13 +140,17 @@ impl Sampler {
             let transmitter = usize::from(trains.transmitter[train]);
             let rms = channel.light.transmitters[transmitter].pulse * RMS_OF_FWHM;
             let slice_fs = rms * SLICE * FS_PER_S as f64;
+            let row = self.photon.row(slice_fs / self.tick_fs as f64, self.height);
             for mark_fs in channel.light.arrivals_fs(train) {
                 let late: f64 = StandardNormal.sample(&mut stream);
                 let at_fs = mark_fs + later_fs + fs_from_s(late * self.sampled.jitter);
-                for (slice, share) in (-SLICES..).zip(&self.shares) {
-                    let charge = self.multiplied(photons * share, &mut stream);
-                    let at_fs = at_fs + (f64::from(slice) * slice_fs) as i64;
-                    self.add_charge(signal, at_fs, charge);
+                let charges =
+                    self.shares.map(|share| self.multiplied(photons * share, &mut stream));
+                let in_a_row = row.weights.len();
+                for (first, charges) in (-SLICES..).step_by(in_a_row).zip(charges.chunks(in_a_row))
+                {
+                    let first_fs = at_fs + (f64::from(first) * slice_fs) as i64;
+                    self.add_charges(signal, first_fs, charges, &row);
                 }
             }
         }
@@ -151,20 +161,21 @@ impl Sampler {
         let codebook = &channel.design.emission.coding().codebook;
         let front_end = &self.sampled.front_end;
         let pulse = Gaussian::new(front_end.mark_rms() / s_from_fs(self.tick_fs));
+        let pulse = pulse.row(0.0, self.sampled.stray);
         for shot in channel.shots.iter().map(|shot| *shot as usize) {
             let (label, word) = (channel.log.label[shot], channel.log.word[shot]);
             for mark in codebook.marks(label, word) {
                 let at_fs = channel.log.fired_at_fs[shot]
                     + i64::from(*mark) * channel.design.emission.coding().chip_fs;
                 let negligible = NEGLIGIBLE * self.sampled.step;
-                signal.add(self.in_ticks(at_fs), (self.sampled.stray, &pulse), negligible);
+                signal.add(self.in_ticks(at_fs), &[1.0], (&pulse, negligible));
             }
         }
     }
 
     /// Steady light that lasts for a stretch of time, tick by tick.
     fn add_stretches(&self, channel: &Channel, chance: &Chance, signal: &mut Signal) {
-        let background = &channel.light.background;
+        let (background, photon) = (&channel.light.background, self.photon.row(0.0, self.height));
         for (number, stretch) in channel.stretches {
             let stretch = *stretch as usize;
             let [from, until] = [background.from_fs[stretch], background.until_fs[stretch]]
@@ -175,7 +186,8 @@ impl Sampler {
                 let part = u32::from(*number) << PART_BITS;
                 let address = Address { stage: Stage::Stretch, index: tick as u64, part };
                 let charge = self.multiplied(photons, &mut chance.stream(address));
-                self.add_charge(signal, tick * self.tick_fs + self.tick_fs / 2, charge);
+                let middle_fs = tick * self.tick_fs + self.tick_fs / 2;
+                self.add_charges(signal, middle_fs, &[charge], &photon);
             }
         }
     }
@@ -191,11 +203,10 @@ impl Sampler {
         Gamma::new(count / spread, spread).map_or(count, |gamma| gamma.sample(stream))
     }
 
-    fn add_charge(&self, signal: &mut Signal, at_fs: i64, charge: f64) {
-        if charge > 0.0 {
-            let pulse = (charge * self.height, &self.photon);
-            signal.add(self.in_ticks(at_fs), pulse, NEGLIGIBLE * self.sampled.step);
-        }
+    /// Adds the pulses of `charges` in a `row`, the first one at `first_fs`.
+    fn add_charges(&self, signal: &mut Signal, first_fs: i64, charges: &[f64], row: &Row) {
+        let negligible = NEGLIGIBLE * self.sampled.step;
+        signal.add(self.in_ticks(first_fs), charges, (row, negligible));
     }
 
     /// Absolute ticks, whole ones and the rest, at `time_fs`.
@@ -242,7 +253,7 @@ impl Sampler {
 }
 
 /// The shape of a pulse.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 struct Gaussian {
     /// rms length, ticks.
     rms: f64,
@@ -254,6 +265,36 @@ impl Gaussian {
     fn new(rms: f64) -> Self {
         Self { rms, shrinks: libm::exp(-(rms * rms).recip()) }
     }
+
+    /// Pulses of this shape and `height`, this many ticks `apart`.
+    fn row(self, apart: f64, height: f64) -> Row {
+        let together = (WIDEST_ROW * self.rms / apart).min(ALL_SLICES as f64 - 1.0) as usize + 1;
+        let weight =
+            |pulse: usize| height * libm::exp(-0.5 * (pulse as f64 * apart / self.rms).powi(2));
+        Row {
+            pulse: self,
+            apart,
+            grows: libm::exp(apart / (self.rms * self.rms)),
+            weights: (0..together).map(weight).collect(),
+        }
+    }
+}
+
+/// Pulses of one shape at even distances Δ, a Gaussian of rms length r. Multiplied by cⱼ, they are added up at little
+/// cost:
+///
+/// > Σ cⱼ·exp(−(x − jΔ)²/2r²) = exp(−x²/2r²)·Σ cⱼ·exp(−j²Δ²/2r²)·uʲ, u = exp(xΔ/r²),
+///
+/// a polynomial in u, which grows by the same ratio from tick to tick.
+#[derive(Debug)]
+struct Row {
+    pulse: Gaussian,
+    /// Ticks from pulse to pulse, Δ.
+    apart: f64,
+    /// From tick to tick u grows by this ratio, exp(Δ/r²).
+    grows: f64,
+    /// Height of a pulse, times exp(−j²Δ²/2r²), for each one of those that are added together.
+    weights: Vec<f64>,
 }
 
 /// The signal of one channel in ticks, in detected photons.
@@ -273,32 +314,41 @@ impl Signal {
         self.level.resize((span.end - span.start).max(0) as usize, 0.0);
     }
 
-    /// Adds a `pulse` of this `height` about `tick` and `part` of a tick, to where it is `negligible`.
-    fn add(
-        &mut self,
-        (tick, part): (i64, f64),
-        (height, pulse): (f64, &Gaussian),
-        negligible: f64,
-    ) {
-        let Gaussian { rms, shrinks } = *pulse;
-        let over = (height / negligible).max(1.0);
+    /// Adds the pulses of a `row`, multiplied by these `factors`, to where they are `negligible`. The first one comes
+    /// at `tick` and `part` of a tick.
+    fn add(&mut self, (tick, part): (i64, f64), factors: &[f64], (row, negligible): (&Row, f64)) {
+        let Gaussian { rms, shrinks } = row.pulse;
+        let highest = factors.iter().copied().fold(0.0, f64::max);
+        if highest <= 0.0 {
+            return;
+        }
+        let over = (highest * row.weights[0] / negligible).max(1.0);
         let reach = ((2.0 * libm::log(over)).sqrt() * rms) as i64 + 1;
-        let (from, to) = (tick - reach - self.first, tick + reach + 1 - self.first);
+        let last = tick + (part + (factors.len() - 1) as f64 * row.apart) as i64;
+        let (from, to) = (tick - reach - self.first, last + reach + 1 - self.first);
         let to = to.min(self.level.len() as i64 - 1);
         if to < 0 {
             return;
         }
+        let mut terms = [0.0; ALL_SLICES];
+        for (term, (factor, weight)) in terms.iter_mut().zip(factors.iter().zip(&row.weights)) {
+            *term = factor * weight;
+        }
         // The part before the span is worked out, too: the rest is then the same to the last bit, wherever a
         // span begins.
         let at = ((from + self.first - tick) as f64 - part) / rms;
-        let mut value = height * libm::exp(-at * at / 2.0);
+        let mut value = libm::exp(-at * at / 2.0);
         let mut grows = libm::exp(-(at + 0.5 / rms) / rms);
+        let mut along = libm::exp(at * row.apart / rms);
         for place in from..=to {
             if let Ok(place) = usize::try_from(place) {
-                self.level[place] += value as f32;
+                let sum =
+                    terms[..factors.len()].iter().rev().fold(0.0, |sum, term| sum * along + term);
+                self.level[place] += (value * sum) as f32;
             }
             value *= grows;
             grows *= shrinks;
+            along *= row.grows;
         }
     }
 }
@@ -308,6 +358,28 @@ mod tests {
     use macropulse_codec::level::forced::at_each_level;
 
     use super::*;
+
+    /// At every tick a row is the sum of its pulses, however far apart they are, but for what is negligible.
+    #[test]
+    fn a_row_is_the_sum_of_its_pulses() {
+        let shapes = [(1.5, 0.2), (1.5, 1.0), (4.0, 3.0), (0.6, 5.0), (0.3, 20.0), (40.0, 40.0)];
+        for ((rms, apart), together) in shapes.into_iter().zip([13, 13, 11, 1, 1, 9]) {
+            let row = Gaussian::new(rms).row(apart, 2.0);
+            assert_eq!(row.weights.len(), together);
+            let factors: Vec<f64> = (0..together).map(|pulse| (pulse * 7 % 5 + 1) as f64).collect();
+            let mut signal = Signal::default();
+            signal.begin(&(-400..900));
+            signal.add((3, 0.4), &factors, (&row, 1e-7));
+            for (tick, level) in (-400..900).zip(&signal.level) {
+                let at = |pulse: usize| (f64::from(tick) - 3.4 - pulse as f64 * apart) / rms;
+                let pulses = factors.iter().enumerate();
+                let expected: f64 = pulses
+                    .map(|(pulse, factor)| 2.0 * factor * libm::exp(-0.5 * at(pulse).powi(2)))
+                    .sum();
+                assert!((f64::from(*level) - expected).abs() < 2e-6 * expected + 2e-6);
+            }
+        }
+    }
 
     /// Halves go to the even code, and what is beyond the codes to the last one.
     #[test]
