@@ -153,7 +153,7 @@ fn log_sum(n: f64) -> f64 {
     log((harmonic(n) - 1.0) / (1.0 - BRIGHT))
 }
 
-/// Whole numbers below this one have their ln Γ and ln H in a table.
+/// Tables hold ln Γ and the terms of [`log_light`] for whole numbers below this one.
 const IN_TABLE: usize = 1024;
 
 /// From here on ln Γ is that of Stirling's series.
@@ -299,14 +299,17 @@ pub(super) fn contradiction(
     best - evidence(own, around) - expected - (lit.len() + dark.len()) as f64 * LN_2
 }
 
-/// A bound of [`contradiction`] at little cost, which it does not exceed. Each bit has `in_bit` marks, and `found` says
-/// how many of them are lit in each bit; `own` are the marks of the lit bits together.
+/// An upper bound of [`contradiction`] that costs little. Each bit has `in_bit` marks, and `found` says how many of
+/// them are lit in each bit. The marks of the lit bits together are `own`.
 ///
 /// The marks of another label are more or fewer by Δk lit and Δj dark ones. Their probability under chance is that of
-/// the own marks times the mean of d^Δk·(1 − d)^Δj, where d has the distribution that all marks and places leave it,
-/// Beta(α, β). By Jensen's inequality its logarithm is at least
+/// the own marks times the mean of d^Δk·(1 − d)^Δj. Here d has the distribution that own marks and places leave it,
+/// Beta(p, q) with p = k + t + 1 and q = n − k + m − t + b. By Jensen's inequality the logarithm of that mean is at
+/// least
 ///
-/// > Δk·[ψ(α) − ψ(α + β)] + Δj·[ψ(β) − ψ(α + β)].
+/// > Δk·\[ψ(p) − ψ(p + q)\] + Δj·\[ψ(q) − ψ(p + q)\].
+///
+/// The bound is ∞ if own marks are no evidence at all.
 pub(super) fn contradiction_at_most(
     found: &mut [u32],
     in_bit: u32,

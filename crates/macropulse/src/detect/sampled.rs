@@ -26,7 +26,7 @@ use super::clock::Clock;
 use super::colour::Colour;
 use super::linear::{PLENTY, Together, gather};
 use super::noise::PART_BITS;
-use crate::channel::Light;
+use crate::channel::{Light, Transmitter};
 use crate::design::Design;
 use crate::design::detector::Sampled;
 use crate::kernels::rounded;
@@ -134,13 +134,15 @@ impl Sampler {
 
     fn add_light(&self, channel: &Channel, chance: &Chance, signal: &mut Signal) {
         let within_fs = fs_from_s(self.sampled.front_end.mark_rms() / RMS_OF_FWHM * TOGETHER);
+        let slices = |transmitter: &Transmitter| {
+            let slice_fs = transmitter.pulse * RMS_OF_FWHM * SLICE * FS_PER_S as f64;
+            (slice_fs, self.row(self.photon, slice_fs / self.tick_fs as f64, self.height))
+        };
+        let slices: Vec<(f64, Row)> = channel.light.transmitters.iter().map(slices).collect();
         for Together { train, later_fs, photons } in gather(channel, within_fs) {
             let trains = &channel.light.trains;
             let mut stream = chance.at(Stage::Photons, trains.address(train));
-            let transmitter = usize::from(trains.transmitter[train]);
-            let rms = channel.light.transmitters[transmitter].pulse * RMS_OF_FWHM;
-            let slice_fs = rms * SLICE * FS_PER_S as f64;
-            let row = self.photon.row(slice_fs / self.tick_fs as f64, self.height);
+            let (slice_fs, row) = &slices[usize::from(trains.transmitter[train])];
             for mark_fs in channel.light.arrivals_fs(train) {
                 let late: f64 = StandardNormal.sample(&mut stream);
                 let at_fs = mark_fs + later_fs + fs_from_s(late * self.sampled.jitter);
@@ -150,7 +152,7 @@ impl Sampler {
                 for (first, charges) in (-SLICES..).step_by(in_a_row).zip(charges.chunks(in_a_row))
                 {
                     let first_fs = at_fs + (f64::from(first) * slice_fs) as i64;
-                    self.add_charges(signal, first_fs, charges, &row);
+                    signal.add(self.in_ticks(first_fs), charges, row);
                 }
             }
         }
@@ -161,21 +163,21 @@ impl Sampler {
         let codebook = &channel.design.emission.coding().codebook;
         let front_end = &self.sampled.front_end;
         let pulse = Gaussian::new(front_end.mark_rms() / s_from_fs(self.tick_fs));
-        let pulse = pulse.row(0.0, self.sampled.stray);
+        let stray = self.row(pulse, 0.0, self.sampled.stray);
         for shot in channel.shots.iter().map(|shot| *shot as usize) {
             let (label, word) = (channel.log.label[shot], channel.log.word[shot]);
             for mark in codebook.marks(label, word) {
                 let at_fs = channel.log.fired_at_fs[shot]
                     + i64::from(*mark) * channel.design.emission.coding().chip_fs;
-                let negligible = NEGLIGIBLE * self.sampled.step;
-                signal.add(self.in_ticks(at_fs), &[1.0], (&pulse, negligible));
+                signal.add(self.in_ticks(at_fs), &[1.0], &stray);
             }
         }
     }
 
     /// Steady light that lasts for a stretch of time, tick by tick.
     fn add_stretches(&self, channel: &Channel, chance: &Chance, signal: &mut Signal) {
-        let (background, photon) = (&channel.light.background, self.photon.row(0.0, self.height));
+        let background = &channel.light.background;
+        let photon = self.row(self.photon, 0.0, self.height);
         for (number, stretch) in channel.stretches {
             let stretch = *stretch as usize;
             let [from, until] = [background.from_fs[stretch], background.until_fs[stretch]]
@@ -187,7 +189,7 @@ impl Sampler {
                 let address = Address { stage: Stage::Stretch, index: tick as u64, part };
                 let charge = self.multiplied(photons, &mut chance.stream(address));
                 let middle_fs = tick * self.tick_fs + self.tick_fs / 2;
-                self.add_charges(signal, middle_fs, &[charge], &photon);
+                signal.add(self.in_ticks(middle_fs), &[charge], &photon);
             }
         }
     }
@@ -203,10 +205,9 @@ impl Sampler {
         Gamma::new(count / spread, spread).map_or(count, |gamma| gamma.sample(stream))
     }
 
-    /// Adds the pulses of `charges` in a `row`, the first one at `first_fs`.
-    fn add_charges(&self, signal: &mut Signal, first_fs: i64, charges: &[f64], row: &Row) {
-        let negligible = NEGLIGIBLE * self.sampled.step;
-        signal.add(self.in_ticks(first_fs), charges, (row, negligible));
+    /// Pulses of this shape and `height`, this many ticks `apart`.
+    fn row(&self, pulse: Gaussian, apart: f64, height: f64) -> Row {
+        Row::new(pulse, apart, height, NEGLIGIBLE * self.sampled.step)
     }
 
     /// Absolute ticks, whole ones and the rest, at `time_fs`.
@@ -265,19 +266,6 @@ impl Gaussian {
     fn new(rms: f64) -> Self {
         Self { rms, shrinks: libm::exp(-(rms * rms).recip()) }
     }
-
-    /// Pulses of this shape and `height`, this many ticks `apart`.
-    fn row(self, apart: f64, height: f64) -> Row {
-        let together = (WIDEST_ROW * self.rms / apart).min(ALL_SLICES as f64 - 1.0) as usize + 1;
-        let weight =
-            |pulse: usize| height * libm::exp(-0.5 * (pulse as f64 * apart / self.rms).powi(2));
-        Row {
-            pulse: self,
-            apart,
-            grows: libm::exp(apart / (self.rms * self.rms)),
-            weights: (0..together).map(weight).collect(),
-        }
-    }
 }
 
 /// Pulses of one shape at even distances Δ, a Gaussian of rms length r. Multiplied by cⱼ, they are added up at little
@@ -295,6 +283,23 @@ struct Row {
     grows: f64,
     /// Height of a pulse, times exp(−j²Δ²/2r²), for each one of those that are added together.
     weights: Vec<f64>,
+    /// A pulse is followed to this height.
+    negligible: f64,
+}
+
+impl Row {
+    fn new(pulse: Gaussian, apart: f64, height: f64, negligible: f64) -> Self {
+        let rms = pulse.rms;
+        let together = (WIDEST_ROW * rms / apart).min(ALL_SLICES as f64 - 1.0) as usize + 1;
+        let weight = |pulse: usize| height * libm::exp(-0.5 * (pulse as f64 * apart / rms).powi(2));
+        Self {
+            pulse,
+            apart,
+            grows: libm::exp(apart / (rms * rms)),
+            weights: (0..together).map(weight).collect(),
+            negligible,
+        }
+    }
 }
 
 /// The signal of one channel in ticks, in detected photons.
@@ -314,15 +319,15 @@ impl Signal {
         self.level.resize((span.end - span.start).max(0) as usize, 0.0);
     }
 
-    /// Adds the pulses of a `row`, multiplied by these `factors`, to where they are `negligible`. The first one comes
+    /// Adds the pulses of a `row`, multiplied by these `factors`, to where they are negligible. The first one comes
     /// at `tick` and `part` of a tick.
-    fn add(&mut self, (tick, part): (i64, f64), factors: &[f64], (row, negligible): (&Row, f64)) {
+    fn add(&mut self, (tick, part): (i64, f64), factors: &[f64], row: &Row) {
         let Gaussian { rms, shrinks } = row.pulse;
         let highest = factors.iter().copied().fold(0.0, f64::max);
         if highest <= 0.0 {
             return;
         }
-        let over = (highest * row.weights[0] / negligible).max(1.0);
+        let over = (highest * row.weights[0] / row.negligible).max(1.0);
         let reach = ((2.0 * libm::log(over)).sqrt() * rms) as i64 + 1;
         let last = tick + (part + (factors.len() - 1) as f64 * row.apart) as i64;
         let (from, to) = (tick - reach - self.first, last + reach + 1 - self.first);
@@ -364,12 +369,12 @@ mod tests {
     fn a_row_is_the_sum_of_its_pulses() {
         let shapes = [(1.5, 0.2), (1.5, 1.0), (4.0, 3.0), (0.6, 5.0), (0.3, 20.0), (40.0, 40.0)];
         for ((rms, apart), together) in shapes.into_iter().zip([13, 13, 11, 1, 1, 9]) {
-            let row = Gaussian::new(rms).row(apart, 2.0);
+            let row = Row::new(Gaussian::new(rms), apart, 2.0, 1e-7);
             assert_eq!(row.weights.len(), together);
             let factors: Vec<f64> = (0..together).map(|pulse| (pulse * 7 % 5 + 1) as f64).collect();
             let mut signal = Signal::default();
             signal.begin(&(-400..900));
-            signal.add((3, 0.4), &factors, (&row, 1e-7));
+            signal.add((3, 0.4), &factors, &row);
             for (tick, level) in (-400..900).zip(&signal.level) {
                 let at = |pulse: usize| (f64::from(tick) - 3.4 - pulse as f64 * apart) / rms;
                 let pulses = factors.iter().enumerate();
