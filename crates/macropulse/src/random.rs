@@ -31,7 +31,7 @@ pub enum Stage {
     Answer = 7,
     /// Which cells are blind at the beginning. Indexed by time, parts by channel.
     Blind = 8,
-    /// Background that lasts for a stretch of time. Indexed by its beginning, parts by channel.
+    /// Background that lasts for a stretch of time. Indexed by its address, parts by channel.
     Stretch = 9,
     /// The noise of an amplifier. Indexed by blocks of its samples, parts by channel.
     Amplifier = 10,

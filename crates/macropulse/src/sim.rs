@@ -289,6 +289,7 @@ impl Measured<'_> {
                 _ => tally.interferer_shots += 1,
             }
         }
+        tally.interferer_shots += light.background.len() as u64;
         tally.returns = returns.shot.len() as u64;
         for number in &returns.number {
             tally.by_number[usize::from(number - 1)] += 1;

@@ -32,6 +32,12 @@ pub fn tof_from_range(range: f64) -> f64 {
     2.0 * range / SPEED_OF_LIGHT
 }
 
+/// Frequency, Hz, of light of the vacuum `wavelength`, m: c/λ.
+#[inline]
+pub fn frequency_from_wavelength(wavelength: f64) -> f64 {
+    SPEED_OF_LIGHT / wavelength
+}
+
 /// Two-way times of flight to targets at `ranges` metres, in whole femtoseconds: for each what
 /// [`fs_from_s`] makes of [`tof_from_range`].
 pub fn tof_fs_from_ranges(ranges: &[f64]) -> Vec<i64> {

@@ -44,3 +44,4 @@ mod slow;
 mod threads;
 mod timing;
 mod turning_heads;
+mod unpulsed;

@@ -320,12 +320,3 @@ fn modulated_light_goes_with_every_scan_pattern() {
         assert_eq!(scan.score.right_fraction(), 1.0, "{name}");
     }
 }
-
-#[test]
-fn modulated_lidars_are_refused_as_interferers() {
-    let text = "version = 1\n[[object]]\nshape.sphere.radius_m = 3.0\n[[interferers]]\n\
-                sensor = \"itof-camera\"\nposition_m = [1.0, 0.0, 0.0]\n";
-    let scene = Scene::from_toml(text, "two.toml", Path::new("")).unwrap();
-    let told = Operating::in_scene(&camera(&[]), &scene).unwrap_err().to_string();
-    assert!(told.contains("light of lidars without pulses as `itof-camera`"), "{told}");
-}

@@ -18,13 +18,17 @@
 //!    that of the sensor's link budget, if it has one ([`aperture_radius`]). The edge of the aperture is
 //!    taken to be Gaussian, so the formula holds for beams both narrower and wider than the aperture.
 //!
+//! Light without pulses becomes stretches of background instead, one for each exposure or ramp.
+//!
 //! All of it is where it is when the shot is fired.
 
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use super::{ALL_MARKS, Light, Link, PulseTrain, PulseTrains};
-use crate::design::Design;
+use super::light::address;
+use super::sent::{Part, Sent};
+use super::{ALL_MARKS, Background, Light, Link, PulseTrain, PulseTrains, Stretch};
+use crate::design::{Design, Field};
 use crate::emit::shot_at;
 use crate::scene::{Ends, Finish, Illuminated, LineOfSight, Mount, Pair, Ray, Scene};
 use crate::units::{SPEED_OF_LIGHT, fs_from_s, s_from_fs, tof_from_range};
@@ -56,7 +60,8 @@ pub(super) fn add(
 ) {
     let (design, other) = (pair.to.design, pair.from.design);
     let Some(link) = Link::of_interferer(design, other, &scene.environment) else { return };
-    let view = View::of(design, log, around_fs(&pair.from));
+    let view = View::of(design, log, &pair.from);
+    let sent = Sent::by(&pair.from, design);
     let farthest = design.scan.light_range.max(other.scan.light_range);
     let mut direct = Direct::of(scene, pair, 2.0 * farthest);
     let finishes = scene.finishes(other.light.wavelength);
@@ -66,9 +71,10 @@ pub(super) fn add(
             transmitter: number,
             link,
             view: &view,
-            pulses: pulses_of(&pair.from),
+            sent: &sent,
             open: open.clone(),
             trains: &mut light.trains,
+            background: &mut light.background,
         };
         for theirs in pair.from.begins.shots(other, open.start - longest_fs..open.end) {
             let look = |shot: usize, direction, way: f64| {
@@ -101,30 +107,27 @@ fn around_fs(other: &Mount<'_>) -> (i64, i64) {
     (micropulse, (length * other.begins.stretch()) as i64 + micropulse)
 }
 
-/// Pulses of a burst of `other`, and the interval between two by the clock of the receiver, fs; a single one
-/// of a macropulse.
-fn pulses_of(other: &Mount<'_>) -> (u64, f64) {
-    other.design.emission.burst().map_or((1, 0.0), |burst| {
-        (burst.pulses.into(), burst.interval_fs as f64 * other.begins.stretch())
-    })
-}
-
 /// The pixels of a sensor, and the times at which their detectors receive light.
 struct View<'a> {
     design: &'a Design,
     log: &'a ShotLog,
     /// Times, fs, by which light begins before its first chip and ends after it.
     around_fs: (i64, i64),
+    /// How long light without pulses shines, fs; 0 of pulses.
+    shines_fs: i64,
     /// Squared chord of the unit sphere to the edge of a field about its axis.
     edge: f64,
 }
 
 impl<'a> View<'a> {
-    fn of(design: &'a Design, log: &'a ShotLog, around_fs: (i64, i64)) -> Self {
+    /// The pixels of `design` while it fires the shots of `log`, as the `other` lidar shines.
+    fn of(design: &'a Design, log: &'a ShotLog, other: &Mount<'_>) -> Self {
+        let around_fs = around_fs(other);
+        let shines_fs = if other.design.emission.is_pulsed() { 0 } else { around_fs.1 };
         let [width, height] = design.scan.model().cell();
         let angle = (width * height / PI).sqrt();
         let edge = (2.0 * libm::sin(angle / 2.0)).powi(2);
-        Self { design, log, around_fs, edge }
+        Self { design, log, around_fs, shines_fs, edge }
     }
 
     /// The times at which first chips may arrive whose light is received, fs. Ascending, and apart.
@@ -183,15 +186,32 @@ impl<'a> View<'a> {
     /// all pixels share always does, unless its field of view follows the beam and is not at the pixel.
     fn receives(&self, pixel: (u16, u16), arrives_fs: i64) -> bool {
         let shot = || shot_at(self.design, self.log, pixel);
-        let field = self.design.budget.as_ref().map(|budget| budget.field);
-        if let Some(field) = field.filter(|field| field.co_scanned.is_some()) {
+        if let Some(field) = self.following() {
             return shot().is_some_and(|shot| {
                 let since_fs = arrives_fs - self.log.fired_at_fs[shot];
-                since_fs >= 0 && field.share(s_from_fs(since_fs)) > 0.0
+                since_fs + self.shines_fs >= 0 && field.share(s_from_fs(since_fs.max(0))) > 0.0
             });
         }
         self.design.channels() == 1
             || shot().is_some_and(|shot| self.gate(shot).contains(&arrives_fs))
+    }
+
+    /// The field of view, if it follows the beam.
+    fn following(&self) -> Option<Field> {
+        let field = self.design.budget.as_ref().map(|budget| budget.field);
+        field.filter(|field| field.co_scanned.is_some())
+    }
+
+    /// When the detector of `pixel` sees light without pulses from there, fs.
+    fn sees(&self, pixel: (u16, u16)) -> Range<i64> {
+        let always = i64::MIN..i64::MAX;
+        let Some(co_scanned) = self.following().and_then(|field| field.co_scanned) else {
+            return always;
+        };
+        shot_at(self.design, self.log, pixel).map_or(always, |shot| {
+            let fired_fs = self.log.fired_at_fs[shot];
+            fired_fs..fired_fs + fs_from_s(co_scanned.pixels * co_scanned.pixel_period)
+        })
     }
 
     /// The channel whose detector sees `pixel`.
@@ -289,16 +309,17 @@ impl Sight {
     }
 }
 
-/// Makes pulse trains of the light of one interferer.
+/// Makes pulse trains and stretches of the light of one interferer.
 struct Arrivals<'a> {
     transmitter: u16,
     link: Link,
     view: &'a View<'a>,
-    /// As [`pulses_of`]: each becomes a train of its own.
-    pulses: (u64, f64),
+    /// Each pulse of a burst becomes a train of its own, and each part of other light a stretch.
+    sent: &'a Sent,
     /// When first chips may arrive, fs.
     open: Range<i64>,
     trains: &'a mut PulseTrains,
+    background: &'a mut Background,
 }
 
 impl Arrivals<'_> {
@@ -343,11 +364,19 @@ impl Arrivals<'_> {
         if photons < FAINTEST {
             return;
         }
-        let (pulses, interval_fs) = self.pulses;
+        let channel = self.view.channel(pixel);
         let first_fs = log.fired_at_fs[shot] + fs_from_s(way / SPEED_OF_LIGHT);
+        let (count, interval_fs) = match self.sent {
+            Sent::Pulses { count, interval_fs } => (*count, *interval_fs),
+            Sent::Parts(parts) => {
+                let shot = log.first.wrapping_add(shot as u64).wrapping_mul(parts.len() as u64);
+                let address = address((self.transmitter, ray as u16), shot);
+                return self.add_parts(parts, (pixel, first_fs), (photons, address));
+            }
+        };
         let train = PulseTrain {
             transmitter: self.transmitter,
-            channel: self.view.channel(pixel),
+            channel,
             arrives_fs: first_fs,
             photons,
             label: log.label[shot],
@@ -356,11 +385,42 @@ impl Arrivals<'_> {
             shot: log.first.wrapping_add(shot as u64),
             way: ray as u16,
         };
-        for pulse in 0..pulses {
+        for pulse in 0..count {
             let arrives_fs = first_fs + (pulse as f64 * interval_fs) as i64;
             if self.open.contains(&arrives_fs) {
-                let shot = train.shot.wrapping_mul(pulses).wrapping_add(pulse);
+                let shot = train.shot.wrapping_mul(count).wrapping_add(pulse);
                 self.trains.push(PulseTrain { arrives_fs, shot, ..train });
+            }
+        }
+    }
+
+    /// Adds light without pulses that begins to arrive at `first_fs`, as far as the detector of `pixel` sees it.
+    /// The parts have `address` and those behind it.
+    fn add_parts(
+        &mut self,
+        parts: &[Part],
+        (pixel, first_fs): ((u16, u16), i64),
+        (photons, address): (f64, u64),
+    ) {
+        let channel = self.view.channel(pixel);
+        let sees = self.view.sees(pixel);
+        let (before, after) = self.view.around_fs;
+        for (address, part) in (address..).zip(parts) {
+            let begins_fs = first_fs + part.from_fs;
+            let from_fs = begins_fs.max(sees.start);
+            let until_fs = (first_fs + part.until_fs).min(sees.end);
+            let is_heard = from_fs < self.open.end - before && until_fs > self.open.start + after;
+            if is_heard && from_fs < until_fs {
+                let per_s = photons * part.per_s;
+                let varies = part.varies.from(s_from_fs(from_fs - begins_fs));
+                self.background.push(Stretch {
+                    channel,
+                    from_fs,
+                    until_fs,
+                    per_s,
+                    varies,
+                    address,
+                });
             }
         }
     }
@@ -448,11 +508,12 @@ mod tests {
         let design =
             Design::open("hdl-64e", &[("scan.scans_per_s".into(), "0.01".into())]).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 3 }.shot_log(&design);
-        let open = View::of(&design, &log, (5, 7)).listening();
+        let scene = Scene::from_toml("version = 1", "test", Path::new("")).unwrap();
+        let open = View::of(&design, &log, &scene.rig(&design).mounts[0]).listening();
         assert_eq!(open.len(), 3);
         assert!(open.iter().zip(&log.fired_at_fs).all(|(open, fired)| open.contains(fired)));
         let close = Design::open("kim-park-2016", &[]).unwrap();
         let log = crate::emit::Band { scan: 0, first: 0, shots: 3 }.shot_log(&close);
-        assert_eq!(View::of(&close, &log, (5, 7)).listening().len(), 1);
+        assert_eq!(View::of(&close, &log, &scene.rig(&close).mounts[0]).listening().len(), 1);
     }
 }

@@ -3,13 +3,13 @@
 //!
 //! Light is pulse trains, background and responses. A **pulse train** is the light of one shot of one lidar
 //! along one way: the marks of a macropulse, or of a sub-macropulse. It comes from a surface or straight from
-//! an interferer. The **background** is a rate λ(t): light without pulses, such as sunlight. A **response**
-//! is such a rate after each mark that the sensor sends. A detector is a function of all three and does not
-//! know whose light it is.
+//! an interferer. The **background** is a rate λ(t): light without pulses, such as sunlight, or that of modulated
+//! and chirped lidars. A **response** is such a rate after each mark that the sensor sends. A detector is a
+//! function of all three and does not know whose light it is.
 
 use macropulse_codec::code::Codebook;
 
-use super::Response;
+use super::{Response, Varies};
 use crate::design::Design;
 
 /// A source of pulse trains: how the marks that a lidar sends follow each other.
@@ -66,8 +66,8 @@ pub struct PulseTrains {
     /// First mark that takes this way and the one behind the last, by their place in the list of
     /// the macropulse; [`ALL_MARKS`] where all of them do.
     pub marks: Vec<[u16; 2]>,
-    /// How fast the surface approaches, m/s; empty where the light of no sensor shows it. Trains of the sensor itself come
-    /// first, and only they have one.
+    /// How fast the surface approaches, m/s; empty where the light of no sensor shows it. Trains of the sensor
+    /// itself come first, and only they have one.
     pub radial_velocity: Vec<f32>,
     /// Number of the shot by its transmitter's own count.
     pub shot: Vec<u64>,
@@ -118,11 +118,9 @@ impl PulseTrains {
         self.way.push(train.way);
     }
 
-    /// Returns the counter of the random numbers of pulse train `index`. It holds the way in the highest
-    /// bits, then the transmitter, and the shot, modulo 2⁴⁰.
+    /// Returns the counter of the random numbers of pulse train `index`.
     pub fn address(&self, index: usize) -> u64 {
-        let (way, transmitter) = (u64::from(self.way[index]), u64::from(self.transmitter[index]));
-        way << 48 | transmitter << 40 | self.shot[index] & ((1 << 40) - 1)
+        address((self.transmitter[index], self.way[index]), self.shot[index])
     }
 
     /// The pulse train at `index`.
@@ -139,6 +137,12 @@ impl PulseTrains {
             way: self.way[index],
         }
     }
+}
+
+/// Returns the counter of the random numbers of light that `shot` sends along one way. It holds the way in the
+/// highest bits, then the transmitter, and the shot, modulo 2⁴⁰.
+pub(super) fn address((transmitter, way): (u16, u16), shot: u64) -> u64 {
+    u64::from(way) << 48 | u64::from(transmitter) << 40 | shot & ((1 << 40) - 1)
 }
 
 impl Light<'_> {
@@ -173,6 +177,63 @@ pub struct Background {
     pub from_fs: Vec<i64>,
     /// Absolute time at which it ends, fs.
     pub until_fs: Vec<i64>,
-    /// Photons per second meanwhile.
+    /// Mean photons per second meanwhile.
     pub per_s: Vec<f64>,
+    /// How its light varies meanwhile.
+    pub varies: Vec<Varies>,
+    /// The counter of its random numbers, which no other stretch of the channel has.
+    pub address: Vec<u64>,
+}
+
+/// One line of the columns of [`Background`]; fields as there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "the columns say it")]
+pub struct Stretch {
+    pub channel: u16,
+    pub from_fs: i64,
+    pub until_fs: i64,
+    pub per_s: f64,
+    pub varies: Varies,
+    pub address: u64,
+}
+
+impl Background {
+    /// Number of stretches.
+    pub fn len(&self) -> usize {
+        self.per_s.len()
+    }
+
+    /// Returns true if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.per_s.is_empty()
+    }
+
+    /// Adds one.
+    pub fn push(&mut self, stretch: Stretch) {
+        self.channel.push(stretch.channel);
+        self.from_fs.push(stretch.from_fs);
+        self.until_fs.push(stretch.until_fs);
+        self.per_s.push(stretch.per_s);
+        self.varies.push(stretch.varies);
+        self.address.push(stretch.address);
+    }
+
+    /// The stretches by channel, then by their ends.
+    pub fn by_channel(&self) -> Vec<Stretch> {
+        let mut stretches: Vec<Stretch> = (0..self.len()).map(|index| self.at(index)).collect();
+        stretches.sort_by_key(|stretch| (stretch.channel, stretch.until_fs));
+        stretches
+    }
+
+    /// The stretch at `index`.
+    pub fn at(&self, index: usize) -> Stretch {
+        Stretch {
+            channel: self.channel[index],
+            from_fs: self.from_fs[index],
+            until_fs: self.until_fs[index],
+            per_s: self.per_s[index],
+            varies: self.varies[index],
+            address: self.address[index],
+        }
+    }
 }

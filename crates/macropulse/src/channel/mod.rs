@@ -19,14 +19,17 @@ mod light;
 mod link;
 mod operating;
 mod response;
+mod sent;
 mod speckle;
+mod varies;
 
 pub use interferers::APERTURE_RADIUS;
-pub use light::{ALL_MARKS, Background, Light, PulseTrain, PulseTrains, Transmitter};
+pub use light::{ALL_MARKS, Background, Light, PulseTrain, PulseTrains, Stretch, Transmitter};
 pub use link::{FILTER, Link};
 pub use operating::{Error, Idealised, Operating, idealised};
 pub use response::Response;
 pub use speckle::Speckle;
+pub use varies::Varies;
 
 use macropulse_codec::ShotLog;
 

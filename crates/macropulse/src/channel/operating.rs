@@ -51,17 +51,25 @@ impl Operating {
     /// The sensor `design` in `scene`.
     ///
     /// # Errors
-    /// As [`Operating::of`]; and if another lidar of the scene sends no pulses.
+    /// As [`Operating::of`]; and if its detector cannot follow the light of another lidar of the scene.
     pub fn in_scene(design: &Design, scene: &Scene) -> Result<Self, Error> {
-        let is_modulated = |one: &&Interferer| !one.design.emission.is_pulsed();
-        if let Some(modulated) = scene.interferers.iter().find(is_modulated) {
+        for Interferer { name, design: other, .. } in &scene.interferers {
+            let link = Link::of_interferer(design, other, &scene.environment);
+            let Some(link) = link.filter(|_| !other.emission.is_pulsed()) else { continue };
+            let why = match design.detector.model().unpulsed() {
+                Some(why) => why,
+                None if link.photons_by((1.0, 1.0), 1.0).is_infinite() => {
+                    "a detector that never misses knows no rate of light: write a \
+                     sensitivity.pd below 1"
+                }
+                None => continue,
+            };
             return Err(Error {
                 sensor: design.name.clone(),
                 environment: scene.name.clone(),
                 message: format!(
-                    "light of lidars without pulses as `{}` is not followed to other sensors: take it out of \
-                     [[interferers]]",
-                    modulated.design.name
+                    "{name} ({}) sends light without pulses, and {why}; or take it out of [[interferers]]",
+                    other.name
                 ),
             });
         }

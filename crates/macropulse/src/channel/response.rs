@@ -4,7 +4,8 @@ use std::borrow::Cow;
 
 use macropulse_codec::ShotLog;
 
-use super::{Background, Light};
+use super::light::address;
+use super::{Background, Light, Stretch, Varies};
 use crate::units::s_from_fs;
 
 /// Light without pulses that each mark of the sensor itself brings, in the channel of its shot.
@@ -22,10 +23,11 @@ impl<'a> Light<'a> {
     /// sent at the beginning of its step.
     pub(crate) fn with_responses(&self, log: &ShotLog) -> Cow<'_, Self> {
         let mut light = Cow::Borrowed(self);
-        for response in self.responses.iter().filter(|response| response.step_fs > 0) {
+        let responses = (0..).zip(&self.responses).filter(|(_, response)| response.step_fs > 0);
+        for (number, response) in responses {
             for channel in channels(log) {
                 let marks = self.marks_in_steps(log, channel, response.step_fs);
-                response.add_to(&mut light.to_mut().background, channel, &marks);
+                response.add_to(&mut light.to_mut().background, (channel, number), &marks);
             }
         }
         light
@@ -51,8 +53,14 @@ impl<'a> Light<'a> {
 }
 
 impl Response {
-    /// Adds the response to `marks`, by the steps in which they are sent, to the `background` of `channel`.
-    fn add_to(&self, background: &mut Background, channel: u16, marks: &[(i64, usize)]) {
+    /// Adds this response, the one of this `number`, to `marks`, by the steps in which they are sent, to the
+    /// `background` of `channel`.
+    fn add_to(
+        &self,
+        background: &mut Background,
+        (channel, number): (u16, u16),
+        marks: &[(i64, usize)],
+    ) {
         let length = self.photons.len();
         for run in marks.chunk_by(|(one, _), (next, _)| next - one <= length as i64) {
             let (first, last) = (run[0].0, run[run.len() - 1].0);
@@ -64,10 +72,14 @@ impl Response {
                 }
             }
             for (step, photons) in (first..).zip(photons).filter(|(_, photons)| *photons > 0.0) {
-                background.channel.push(channel);
-                background.from_fs.push(step * self.step_fs);
-                background.until_fs.push((step + 1) * self.step_fs);
-                background.per_s.push(photons / s_from_fs(self.step_fs));
+                background.push(Stretch {
+                    channel,
+                    from_fs: step * self.step_fs,
+                    until_fs: (step + 1) * self.step_fs,
+                    per_s: photons / s_from_fs(self.step_fs),
+                    varies: Varies::Not,
+                    address: address((0, number), step as u64),
+                });
             }
         }
     }

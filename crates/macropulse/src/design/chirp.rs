@@ -55,6 +55,11 @@ impl Chirp {
         before + self.settle_fs
     }
 
+    /// How long ramp number `ramp` is recorded, fs.
+    pub fn recorded_fs(&self, ramp: usize) -> i64 {
+        if ramp > 0 { self.down_fs } else { self.up_fs }
+    }
+
     /// The share of the light of a shot that each ramp brings, in their order.
     pub fn shares(&self) -> Vec<f64> {
         let length = s_from_fs(self.length_fs());
@@ -125,8 +130,8 @@ impl Model for Chirp {
 
     /// From the beginning of the first ramp, the unrecorded part included, to the end of the last one.
     fn length_fs(&self) -> i64 {
-        self.begins_fs(self.ramps().len() - 1)
-            + if self.down_fs > 0 { self.down_fs } else { self.up_fs }
+        let last = self.ramps().len() - 1;
+        self.begins_fs(last) + self.recorded_fs(last)
     }
 
     fn exposures(&self) -> Option<Exposures> {

@@ -19,6 +19,12 @@ pub const MOST_TONES: usize = 4;
 /// Harmonics of square waves that a receiver knows: up to this one.
 const HARMONICS: usize = 63;
 
+/// The highest harmonic of the power of a square wave that is followed.
+const HIGHEST_OF_POWER: u32 = 255;
+
+/// Phases that differ by less than this, rad, are the same.
+const SAME_PHASE: f64 = 1e-6;
+
 /// An exposure is longer than the flight of light that is followed by this factor at least: light of the exposure
 /// before it is neglected.
 const LONGER: f64 = 20.0;
@@ -53,6 +59,21 @@ pub enum Wave {
     Square,
 }
 
+/// A phase in turns, without whole ones: from −½ to ½.
+fn part_of_turn(phase: f64) -> f64 {
+    let turns = phase / (2.0 * PI);
+    turns - turns.round()
+}
+
+/// The mean of what is `at` a phase over the phases between two, rad. The integral of what it adds to 1 is `up_to` a
+/// phase.
+fn mean(from: f64, until: f64, at: impl Fn(f64) -> f64, up_to: impl Fn(f64) -> f64) -> f64 {
+    if (until - from).abs() < SAME_PHASE {
+        return at((from + until) / 2.0);
+    }
+    1.0 + (up_to(until) - up_to(from)) / (until - from)
+}
+
 impl Wave {
     /// The charge of a tap over its mean for light whose phase is this far, rad, behind that of the tap, with such a
     /// `contrast` of the fundamental.
@@ -61,11 +82,60 @@ impl Wave {
             Self::Sine => 1.0 + contrast * libm::cos(behind),
             Self::Square => {
                 // 1 at 0 and −1 at half a turn, with a fundamental of 8/π².
-                let turns = behind / (2.0 * PI);
-                let triangle = 1.0 - 4.0 * (turns - turns.round()).abs();
+                let triangle = 1.0 - 4.0 * part_of_turn(behind).abs();
                 1.0 + contrast * PI * PI / 8.0 * triangle
             }
         }
+    }
+
+    /// The mean of [`Wave::share`] over phases that go evenly from one to another one, rad.
+    pub fn mean_share(self, contrast: f64, from: f64, until: f64) -> f64 {
+        let up_to = |phase: f64| match self {
+            Self::Sine => contrast * libm::sin(phase),
+            Self::Square => {
+                let turns = part_of_turn(phase);
+                contrast * PI.powi(3) / 4.0 * turns * (1.0 - 2.0 * turns.abs())
+            }
+        };
+        mean(from, until, |behind| self.share(contrast, behind), up_to)
+    }
+
+    /// The power of fully modulated light over its mean, this far behind its peak, rad.
+    pub fn power(self, behind: f64) -> f64 {
+        match self {
+            Self::Sine => 1.0 + libm::cos(behind),
+            Self::Square if part_of_turn(behind).abs() <= 0.25 => 2.0,
+            Self::Square => 0.0,
+        }
+    }
+
+    /// The mean of [`Wave::power`] over phases that go evenly from one to another one, rad.
+    pub fn mean_power(self, from: f64, until: f64) -> f64 {
+        let up_to = |phase: f64| match self {
+            Self::Sine => libm::sin(phase),
+            Self::Square => {
+                // It rises for a quarter of a turn to both sides of the peak, and falls beyond.
+                let turns = part_of_turn(phase);
+                2.0 * PI * (if turns.abs() <= 0.25 { turns } else { turns.signum() * 0.5 - turns })
+            }
+        };
+        mean(from, until, |behind| self.power(behind), up_to)
+    }
+
+    /// Harmonics of the power of fully modulated light up to this number: the number of each, and its amplitude over the
+    /// mean.
+    pub fn harmonics_of_power(self, highest: f64) -> impl Iterator<Item = (u32, f64)> {
+        let last = match self {
+            Self::Sine => 1,
+            Self::Square => (highest as u32).clamp(1, HIGHEST_OF_POWER),
+        };
+        (1..=last).step_by(2).map(move |number| match self {
+            Self::Sine => (number, 1.0),
+            Self::Square => {
+                let sign = if number % 4 == 1 { 1.0 } else { -1.0 };
+                (number, sign * 4.0 / (PI * f64::from(number)))
+            }
+        })
     }
 
     /// The most contrast: more would take charge away.

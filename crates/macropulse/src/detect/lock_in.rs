@@ -6,6 +6,11 @@
 //! tap, and c is its contrast. A surface that approaches at v shortens τ by 2v/c per second. Steady light adds the
 //! same to every tap. A pulse of another lidar adds its photons times the gain of the tap at its arrival. The
 //! electrons of a tap are a Poisson variable.
+//!
+//! Modulated light of another lidar, of the frequency f', adds the integral of its rate times that share over the time
+//! in which it meets the exposure. Its phase behind the tap, 2π·(f·t − f'·t') − θ, changes by 2π·(f − f') per
+//! second: t and t' are the times since the exposure and since the other light began. Harmonics of frequencies that
+//! differ by more are neglected.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +18,7 @@ use macropulse_codec::{Given, ShotLog, Taps};
 use rand_distr::{Distribution, Poisson, StandardNormal};
 
 use super::{ShotRecorder, own_by_shot};
-use crate::channel::Light;
+use crate::channel::{Light, Stretch, Varies};
 use crate::design::detector::LockIn;
 use crate::design::emission::Model;
 use crate::design::{Design, Modulation};
@@ -51,6 +56,7 @@ impl Demodulator {
 
     fn taps(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Taps {
         let (own, others) = (own_by_shot(light), pulses_of_others(light));
+        let stretches = light.background.by_channel();
         let taps = self.lock_in.modulation.taps();
         let steady = self.lock_in.dark + light.background.steady * self.efficiency;
         let of_each = steady * s_from_fs(self.lock_in.modulation.exposure_fs);
@@ -71,7 +77,10 @@ impl Demodulator {
                 self.add_path(&mut means, &path);
             }
             self.add_pulses(&mut means, (channel, fired_fs), (&others, light));
-            self.add_stretches(&mut means, (channel, fired_fs), light);
+            let seen = |it: &Stretch| (it.channel, it.until_fs) <= (channel, fired_fs);
+            let seen = &stretches[stretches.partition_point(seen)..];
+            let seen = seen.iter().take_while(|it| it.channel == channel);
+            seen.for_each(|stretch| self.add_stretch(&mut means, fired_fs, stretch));
             let mut stream = chance.at(Stage::LockIn, number);
             codes.extend(means.iter().map(|mean| {
                 let drawn = Poisson::new(*mean).map_or(0.0, |law| law.sample(&mut stream));
@@ -143,21 +152,30 @@ impl Demodulator {
         }
     }
 
-    /// Adds steady light of stretches of time.
-    fn add_stretches(&self, means: &mut [f64], (channel, fired_fs): (u16, i64), light: &Light) {
-        let background = &light.background;
-        let end_fs = fired_fs + self.lock_in.modulation.length_fs();
-        for (at, per_s) in background.per_s.iter().enumerate() {
-            let (from, until) = (background.from_fs[at], background.until_fs[at]);
-            if background.channel[at] != channel || until <= fired_fs || from >= end_fs {
+    /// Adds the light of `stretch` that comes while a tap of the shot fired at `fired_fs` collects light.
+    fn add_stretch(&self, means: &mut [f64], fired_fs: i64, stretch: &Stretch) {
+        let modulation = &self.lock_in.modulation;
+        for (tap, (mean, (hz, contrast, phase))) in (0..).zip(means.iter_mut().zip(self.each_tap()))
+        {
+            let begins_fs = fired_fs + modulation.begins_fs(tap);
+            let from_fs = stretch.from_fs.max(begins_fs);
+            let until_fs = stretch.until_fs.min(begins_fs + modulation.exposure_fs);
+            if from_fs >= until_fs {
                 continue;
             }
-            for (tap, mean) in (0..).zip(means.iter_mut()) {
-                let begins = fired_fs + self.lock_in.modulation.begins_fs(tap);
-                let both =
-                    until.min(begins + self.lock_in.modulation.exposure_fs) - from.max(begins);
-                *mean += per_s * self.efficiency * s_from_fs(both.max(0));
-            }
+            let share = match stretch.varies {
+                Varies::Power { hz: its, phase: behind, .. } => {
+                    let at = |time_fs: i64| {
+                        TAU * hz * s_from_fs(time_fs - begins_fs)
+                            - TAU * its * s_from_fs(time_fs - stretch.from_fs)
+                    };
+                    let apart = at(from_fs) - phase - behind;
+                    let turns = TAU * (hz - its) * s_from_fs(until_fs - from_fs);
+                    modulation.wave.mean_share(contrast, apart, apart + turns)
+                }
+                Varies::Not | Varies::Frequency { .. } => 1.0,
+            };
+            *mean += stretch.per_s * self.efficiency * s_from_fs(until_fs - from_fs) * share;
         }
     }
 }

@@ -263,7 +263,7 @@ fn own_by_shot(light: &Light) -> Vec<(u64, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::channel::{Background, PulseTrain, Response, Transmitter};
+    use crate::channel::{Background, PulseTrain, Response, Transmitter, Varies};
     use crate::units::{FS_PER_S, s_from_fs};
 
     /// The physical sensor by night with another detector.
@@ -330,6 +330,8 @@ mod tests {
                 from_fs: vec![from_fs; 2],
                 until_fs: vec![until_fs; 2],
                 per_s: vec![3e8, 1e8],
+                varies: vec![Varies::Not; 2],
+                address: vec![0, 1],
                 ..Background::default()
             };
             let light = Light { background, ..Light::default() };

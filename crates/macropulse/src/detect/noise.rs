@@ -3,22 +3,24 @@
 //! The steady part of the rate is cut into windows of time. The counts of each are drawn from its own
 //! address, so that neighbouring bands see the same ones where they overlap. Within a window the waits from
 //! one count to the next are exponential. A process without memory may start anew with every window.
-//! Stretches of time with a rate of their own are windows of their own: counts of independent Poisson
-//! processes add up to one of the summed rate.
+//! Stretches of time with a rate of their own have windows of their own: counts of independent Poisson
+//! processes add up to one of the summed rate. If the rate varies, counts are drawn at its highest value, and
+//! each is kept with the share that the rate at its time has in it.
 //!
 //! At high rates most counts would fall into the tick of another one, and converters make one event of both.
 //! Then each tick is drawn: lit or dark.
 
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 use rand_distr::{Distribution, Exp1};
 
 use super::channel::Channel;
 use super::clock::Clock;
+use crate::channel::Stretch;
 use crate::design::{Design, PARTS_OF_TICK};
 use crate::kernels::{END, Events, GROUP};
-use crate::random::{Address, Chance, Stage};
-use crate::units::FS_PER_S;
+use crate::random::{Address, Chance, Stage, Stream};
+use crate::units::{FS_PER_S, s_from_fs};
 
 /// A wait is rounded to a fraction of its mean: one part in this number, or finer.
 const FINENESS: f64 = (1 << 18) as f64;
@@ -111,51 +113,117 @@ pub(super) fn counts_in(
     }
     let from = times.len();
     for stretch in stretches(channel) {
-        let span = channel.whole_span();
-        let mut stream = chance.stream(stretch.address);
-        let mut passed_fs = 0.0;
-        loop {
-            let wait: f64 = Exp1.sample(&mut stream);
-            passed_fs += wait / stretch.per_s * FS_PER_S as f64;
-            let now_fs = stretch.from_fs + passed_fs as i64;
-            if now_fs >= stretch.until_fs {
-                break;
-            }
-            let time = channel.clock.time(now_fs);
-            times.extend(span.contains(&time).then_some(time as u32));
-        }
+        stretch.counts(channel, chance, times);
     }
     if times.len() > from {
         times.sort_unstable();
     }
 }
 
+/// An odd number without a pattern: its multiples tell the addresses of windows apart.
+const ANOTHER: u64 = 0x9e37_79b9_7f4a_7c15;
+
 /// Background that lasts for a stretch of time.
-pub(super) struct Stretch {
-    pub from_fs: i64,
-    pub until_fs: i64,
-    /// Detections per second.
-    pub per_s: f64,
+pub(super) struct Drawn {
+    pub light: Stretch,
+    /// Detections per second, the mean of the stretch.
+    per_s: f64,
     /// Address of its random numbers.
-    pub address: Address,
+    address: Address,
 }
 
 /// The stretches that `channel` sees, those without light left out.
-pub(super) fn stretches(channel: &Channel) -> impl Iterator<Item = Stretch> {
+pub(super) fn stretches(channel: &Channel) -> impl Iterator<Item = Drawn> {
     let background = &channel.light.background;
     channel.stretches.iter().map(move |(_, i)| {
-        let i = *i as usize;
-        let (from_fs, until_fs) = (background.from_fs[i], background.until_fs[i]);
-        // Stretches that begin at once differ in their end or in their rate.
-        let rate = background.per_s[i].to_bits().rotate_left(42);
-        let others = (until_fs as u64).rotate_left(21) ^ rate;
-        let address = Address {
-            stage: Stage::Stretch,
-            index: from_fs as u64 ^ others,
-            part: u32::from(channel.number) << PART_BITS,
-        };
-        Stretch { from_fs, until_fs, per_s: channel.steady_in(i), address }
+        let light = background.at(*i as usize);
+        let part = u32::from(channel.number) << PART_BITS;
+        let address = Address { stage: Stage::Stretch, index: light.address, part };
+        Drawn { light, per_s: channel.steady_in(*i as usize), address }
     })
+}
+
+impl Drawn {
+    /// When the first count comes at `from_fs` or later, fs. `None` if the stretch ends before.
+    pub fn first(&self, from_fs: i64, until_fs: i64, stream: &mut Stream) -> Option<i64> {
+        // Counts at the highest rate, each kept with the share that its rate has in it.
+        let most = self.light.varies.most_power();
+        let mut passed_fs = 0.0;
+        loop {
+            let wait: f64 = Exp1.sample(stream);
+            passed_fs += wait / (self.per_s * most) * FS_PER_S as f64;
+            if passed_fs >= (until_fs - from_fs) as f64 {
+                return None;
+            }
+            let now_fs = from_fs + passed_fs as i64;
+            if most == 1.0 || stream.fraction() * most < self.power(now_fs) {
+                return Some(now_fs);
+            }
+        }
+    }
+
+    /// The power over its mean at `now_fs`.
+    fn power(&self, now_fs: i64) -> f64 {
+        self.light.varies.power(s_from_fs(now_fs - self.light.from_fs))
+    }
+
+    /// Appends the counts while `channel` listens. They are drawn window by window, so that none is drawn far away
+    /// from it.
+    fn counts(&self, channel: &Channel, chance: &Chance, times: &mut Vec<u32>) {
+        let tick_fs = channel.design.clock.tick_fs;
+        let Stretch { from_fs, until_fs, .. } = self.light;
+        let span = channel.whole_span();
+        let at = |time_fs: i64| channel.clock.time(time_fs);
+        let is_crowded = self.per_s * s_from_fs(tick_fs) > CROWDED;
+        let ticks_fs = TICKS * tick_fs;
+        let window_fs = match is_crowded {
+            true => ticks_fs,
+            false => ((TICKS as f64 / self.per_s * FS_PER_S as f64) as i64).max(ticks_fs),
+        };
+        for window in from_fs.div_euclid(window_fs)..=(until_fs - 1).div_euclid(window_fs) {
+            let begins_fs = window * window_fs;
+            let lit = begins_fs.max(from_fs)..begins_fs.saturating_add(window_fs).min(until_fs);
+            if at(lit.end) < *span.start() || at(lit.start) > *span.end() {
+                continue;
+            }
+            let index = self.address.index ^ (window as u64).wrapping_mul(ANOTHER);
+            let mut stream = chance.stream(Address { index, ..self.address });
+            let mut add = |time_fs: i64| {
+                let time = at(time_fs);
+                times.extend(span.contains(&time).then_some(time as u32));
+            };
+            match is_crowded {
+                true => self.lit_ticks(lit, tick_fs, &mut stream, &mut add),
+                false => self.each(lit, &mut stream, &mut add),
+            }
+        }
+    }
+
+    /// Calls `add` with the time of each count.
+    fn each(&self, lit: Range<i64>, stream: &mut Stream, add: &mut impl FnMut(i64)) {
+        let Range { mut start, end } = lit;
+        while let Some(now_fs) = self.first(start, end, stream) {
+            add(now_fs);
+            start = now_fs;
+        }
+    }
+
+    /// Calls `add` with the middle of each tick that has a count: converters make one event of the counts in a tick.
+    fn lit_ticks(
+        &self,
+        lit: Range<i64>,
+        tick_fs: i64,
+        stream: &mut Stream,
+        add: &mut impl FnMut(i64),
+    ) {
+        for tick in lit.start.div_euclid(tick_fs)..lit.end.div_euclid(tick_fs) {
+            let since = |tick: i64| s_from_fs(tick * tick_fs - self.light.from_fs);
+            let power = self.light.varies.mean_power(since(tick), since(tick + 1));
+            if stream.fraction() > libm::exp(-power * self.per_s * s_from_fs(tick_fs)) {
+                add(tick * tick_fs + tick_fs / 2);
+            }
+        }
+    }
 }
 
 /// The span of time in which counts are drawn, with its clock, chance and channel.

@@ -26,7 +26,7 @@ use super::clock::Clock;
 use super::colour::Colour;
 use super::linear::{PLENTY, Together, gather};
 use super::noise::PART_BITS;
-use crate::channel::{Light, Transmitter};
+use crate::channel::{Light, Stretch, Transmitter};
 use crate::design::Design;
 use crate::design::detector::Sampled;
 use crate::kernels::rounded;
@@ -174,23 +174,30 @@ impl Sampler {
         }
     }
 
-    /// Steady light that lasts for a stretch of time, tick by tick.
+    /// Light without pulses that lasts for stretches of time, tick by tick.
     fn add_stretches(&self, channel: &Channel, chance: &Chance, signal: &mut Signal) {
-        let background = &channel.light.background;
-        let photon = self.row(self.photon, 0.0, self.height);
-        for (number, stretch) in channel.stretches {
-            let stretch = *stretch as usize;
-            let [from, until] = [background.from_fs[stretch], background.until_fs[stretch]]
-                .map(|fs| fs.div_euclid(self.tick_fs));
-            let photons = channel.steady_in(stretch) * s_from_fs(self.tick_fs);
-            let last = signal.first + signal.level.len() as i64;
+        let Some((number, _)) = channel.stretches.first() else { return };
+        let tick = s_from_fs(self.tick_fs);
+        let mut photons = vec![0.0; signal.level.len()];
+        let last = signal.first + signal.level.len() as i64;
+        for (_, stretch) in channel.stretches {
+            let Stretch { from_fs, until_fs, varies, .. } =
+                channel.light.background.at(*stretch as usize);
+            let [from, until] = [from_fs, until_fs].map(|fs| fs.div_euclid(self.tick_fs));
+            let per_tick = channel.steady_in(*stretch as usize) * tick;
             for tick in from.max(signal.first)..until.min(last) {
-                let part = u32::from(*number) << PART_BITS;
-                let address = Address { stage: Stage::Stretch, index: tick as u64, part };
-                let charge = self.multiplied(photons, &mut chance.stream(address));
-                let middle_fs = tick * self.tick_fs + self.tick_fs / 2;
-                signal.add(self.in_ticks(middle_fs), &[charge], &photon);
+                let since = |tick: i64| s_from_fs(tick * self.tick_fs - from_fs);
+                let power = varies.mean_power(since(tick), since(tick + 1));
+                photons[(tick - signal.first) as usize] += per_tick * power;
             }
+        }
+        let photon = self.row(self.photon, 0.0, self.height);
+        for (tick, photons) in (signal.first..).zip(photons).filter(|(_, photons)| *photons > 0.0) {
+            let part = u32::from(*number) << PART_BITS;
+            let address = Address { stage: Stage::Stretch, index: tick as u64, part };
+            let charge = self.multiplied(photons, &mut chance.stream(address));
+            let middle_fs = tick * self.tick_fs + self.tick_fs / 2;
+            signal.add(self.in_ticks(middle_fs), &[charge], &photon);
         }
     }
 

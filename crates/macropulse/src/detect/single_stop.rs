@@ -31,7 +31,7 @@ use macropulse_codec::statistics::{normal_order, normal_quantile, normal_tail};
 use rand_distr::{Distribution, Exp1, Gamma, Poisson, StandardNormal};
 
 use super::channel::Channel;
-use super::noise::{Stretch, stretches};
+use super::noise::{Drawn, stretches};
 use super::{Detections, Kind, Memory};
 use crate::design::detector::{PLENTY, SingleStopSetting};
 use crate::random::{Chance, Stage, Stream};
@@ -115,7 +115,7 @@ struct Firing<'a> {
     rms_fs: f64,
     /// Background that fires it as false firings do. A detector that needs more photons than one adds them
     /// up: to it, background is noise.
-    stretches: Vec<Stretch>,
+    stretches: Vec<Drawn>,
 }
 
 impl<'a> Firing<'a> {
@@ -164,17 +164,15 @@ impl<'a> Firing<'a> {
     /// When it first fires without a pulse while `gate` is open. Firings are as frequent at all times,
     /// and to take a walk off them would change nothing.
     fn by_itself(&self, gate: &RangeInclusive<i64>, stream: &mut Stream) -> Option<Fired> {
-        let mut wait_fs = |per_s: f64| -> i64 {
+        let rate = self.firing.false_rate;
+        let steady = (rate > 0.0).then(|| {
             let wait: f64 = Exp1.sample(stream);
-            (wait / per_s * FS_PER_S as f64) as i64
-        };
-        let steady = (self.firing.false_rate > 0.0)
-            .then(|| gate.start().saturating_add(wait_fs(self.firing.false_rate)));
+            gate.start().saturating_add((wait / rate * FS_PER_S as f64) as i64)
+        });
         let others = self.stretches.iter().filter_map(|stretch| {
-            let from_fs = stretch.from_fs.max(*gate.start());
-            let until_fs = stretch.until_fs.min(*gate.end());
-            let first_fs = (from_fs < until_fs).then(|| from_fs + wait_fs(stretch.per_s))?;
-            (first_fs < until_fs).then_some(first_fs)
+            let from_fs = stretch.light.from_fs.max(*gate.start());
+            let until_fs = stretch.light.until_fs.min(*gate.end());
+            (from_fs < until_fs).then(|| stretch.first(from_fs, until_fs, stream))?
         });
         let time_fs = others.chain(steady).min()?;
         Some(Fired { time_fs, follow: None })

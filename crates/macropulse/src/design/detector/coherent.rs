@@ -160,6 +160,10 @@ impl Model for Coherent {
         self.just_found()
     }
 
+    fn unpulsed(&self) -> Option<&'static str> {
+        Some("the beat of two lasers is not simulated: give it another wavelength")
+    }
+
     fn false_rate(&self, _: f64) -> f64 {
         0.0
     }

@@ -134,6 +134,10 @@ impl Model for Linear {
         self.front_end.response()
     }
 
+    fn unpulsed(&self) -> Option<&'static str> {
+        Some("a photodiode behind a comparator is not simulated in it: take [adc] for [comparator]")
+    }
+
     /// The threshold follows the noise, so that this crosses it as often in any light.
     fn false_rate(&self, _: f64) -> f64 {
         self.false_alarm

@@ -248,6 +248,12 @@ pub trait Model {
         None
     }
 
+    /// The reason why the light of lidars without pulses cannot be followed to it, and a remedy: two clauses;
+    /// `None` if it can.
+    fn unpulsed(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Events per second that it would make without the light of any lidar, were it always ready.
     fn false_rate(&self, background: f64) -> f64;
 

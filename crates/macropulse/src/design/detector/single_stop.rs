@@ -180,6 +180,12 @@ impl Model for SingleStop {
         true
     }
 
+    fn unpulsed(&self) -> Option<&'static str> {
+        let told = "a detector that more photons than one fire is not simulated in it: set \
+                    detector.single-stop.firing_photons to 1";
+        (self.firing_photons > 1).then_some(told)
+    }
+
     fn false_rate(&self, background: f64) -> f64 {
         self.setting(background).false_rate
     }

@@ -10,14 +10,16 @@
 //! that of their times behind the jitter; the light between two bins of a cycle is even over the bin.
 
 mod draw;
+mod shining;
 
 use macropulse_codec::decode::histogram::{Kernel, STEPS};
 use macropulse_codec::statistics::normal_tail;
 use macropulse_codec::{Given, Histograms, ShotLog};
 
 use self::draw::Cells;
+use self::shining::Shining;
 use super::ShotRecorder;
-use crate::channel::Light;
+use crate::channel::{Light, Stretch};
 use crate::design::detector::{Geiger, PLENTY};
 use crate::design::{Burst, Design, Histogram};
 use crate::random::{Chance, Stage};
@@ -80,14 +82,20 @@ impl Accumulator {
     fn histograms(&self, chance: &Chance, log: &ShotLog, light: &Light) -> Histograms {
         let mut counts = Vec::with_capacity(log.owned.len() * self.bins as usize);
         let order = by_channel(light);
+        let stretches = light.background.by_channel();
         let steady = self.geiger.dark + light.background.steady * self.efficiency;
         let in_bin = steady * s_from_fs(self.bin_fs);
         let unpulsed = self.unpulsed(light, in_bin);
         for shot in log.owned.clone() {
             let pulses = self.pulses(&order, light, (log.channel[shot], log.fired_at_fs[shot]));
             let mut stream = chance.at(Stage::Histogram, log.first + shot as u64);
-            let segments = segments(&pulses, self.burst.pulses);
-            let lit = segments.map(|(cycles, pulses)| (cycles, self.rates(&pulses, &unpulsed)));
+            let shining = self.shining(&stretches, (log.channel[shot], log.fired_at_fs[shot]));
+            let segments = segments((&pulses, &shining), self.burst.pulses);
+            let lit = segments.map(|(cycles, pulses, shining)| {
+                let mut rates = unpulsed.clone();
+                shining.iter().for_each(|it| it.add(&mut rates, self.bin_fs, self.efficiency));
+                (cycles, self.rates(&pulses, rates))
+            });
             self.cells.count(lit, in_bin, &mut stream, &mut counts);
         }
         Histograms {
@@ -158,6 +166,14 @@ impl Accumulator {
         found
     }
 
+    /// The light without pulses of other lidars in the cycles of a shot fired at `fired_fs`, as its `channel` sees it.
+    fn shining(&self, stretches: &[Stretch], (channel, fired_fs): (u16, i64)) -> Vec<Shining> {
+        let burst = (self.burst.interval_fs, self.burst.pulses);
+        let from = stretches.partition_point(|it| (it.channel, it.until_fs) <= (channel, fired_fs));
+        let seen = stretches[from..].iter().take_while(|it| it.channel == channel);
+        seen.flat_map(|stretch| Shining::of(stretch, fired_fs, burst)).collect()
+    }
+
     /// Mean detections in each bin of a cycle without pulses: `steady` ones, and those of the responses of `light`,
     /// as if the burst had begun long before.
     fn unpulsed(&self, light: &Light, steady: f64) -> Vec<f64> {
@@ -179,9 +195,8 @@ impl Accumulator {
         }
     }
 
-    /// Mean detections in each bin of a cycle with these `pulses` and what is `unpulsed`.
-    fn rates(&self, pulses: &[Pulses], unpulsed: &[f64]) -> Vec<f64> {
-        let mut rates = unpulsed.to_vec();
+    /// Adds these `pulses` to the `rates`, the mean detections in each bin of a cycle.
+    fn rates(&self, pulses: &[Pulses], mut rates: Vec<f64>) -> Vec<f64> {
         for pulse in pulses {
             match pulse.shape {
                 Shape::Gaussian(rms_fs) => self.add_gaussian(pulse, rms_fs, &mut rates),
@@ -224,18 +239,26 @@ fn by_channel(light: &Light) -> Vec<(u16, i64, usize)> {
     order
 }
 
-/// Runs of cycles in which the same of these `pulses` come: how many cycles, and the pulses.
+/// A run of cycles with the same light: how many they are, the pulses that come in each, and what shines without pulses.
+type Segment<'a> = (u32, Vec<Pulses<'a>>, Vec<Shining>);
+
+/// Runs of cycles in which the same light comes, out of `pulses` and what is `shining`.
 fn segments<'a>(
-    pulses: &[Pulses<'a>],
+    (pulses, shining): (&[Pulses<'a>], &[Shining]),
     cycles: u32,
-) -> impl Iterator<Item = (u32, Vec<Pulses<'a>>)> {
+) -> impl Iterator<Item = Segment<'a>> {
     let mut edges: Vec<i64> = pulses.iter().flat_map(|pulse| pulse.cycles).collect();
+    edges.extend(shining.iter().flat_map(|light| light.cycles));
     edges.extend([0, i64::from(cycles)]);
     edges.sort_unstable();
     edges.dedup();
     let runs: Vec<[i64; 2]> = edges.windows(2).map(|pair| [pair[0], pair[1]]).collect();
     runs.into_iter().map(move |[from, until]| {
-        let comes = |pulse: &&Pulses| pulse.cycles[0] <= from && until <= pulse.cycles[1];
-        ((until - from) as u32, pulses.iter().filter(comes).copied().collect())
+        let meets = |of: [i64; 2]| of[0] <= from && until <= of[1];
+        (
+            (until - from) as u32,
+            pulses.iter().filter(|pulse| meets(pulse.cycles)).copied().collect(),
+            shining.iter().filter(|light| meets(light.cycles)).copied().collect(),
+        )
     })
 }
